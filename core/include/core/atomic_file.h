@@ -1,0 +1,17 @@
+// Files that are there whole or not at all, whenever the power goes.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace plumbline::core {
+
+// Writes a temporary file beside `path` (PATH.tmp-PID-K, never shared between writers), syncs it, and renames it to
+// `path`. A path that exists and is no regular file (a pipe, /dev/stdout) is written to directly.
+// Throws std::system_error naming the path; the temporary file is then removed.
+void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+
+// Syncs the closed file `from`, renames it to `to` and syncs the folder. Throws std::system_error.
+void publish_file(const std::filesystem::path& from, const std::filesystem::path& to);
+
+}  // namespace plumbline::core

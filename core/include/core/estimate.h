@@ -1,0 +1,76 @@
+// What an estimator answers.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/calibration.h"
+#include "core/state.h"
+#include "core/time.h"
+
+namespace plumbline::core {
+
+enum class SolveStatus {
+  kConverged,
+  kIterationLimit,
+  kDiverged,              // the solver could not reduce the cost
+  kFalseMinimum,          // converged where the residuals are far larger than their noise
+  kFailedInitialisation,  // too little data, or no starting point in front of the camera
+};
+inline constexpr std::array<std::string_view, 5> kSolveStatusNames = {
+    "converged", "iteration_limit", "diverged", "false_minimum", "failed_initialisation"};
+
+struct StampedState {
+  TimeNs t_ns = 0;  // IMU clock
+  State state;
+};
+
+// The joint posterior covariance of calibration and last state, in the perturbations of docs/conventions.md:
+//   [ p_B_C | theta_B_C | td (middle row) | readout | last state (15) ]
+// Rows and columns of a parameter that was held fixed are zero.
+inline constexpr int kCovExtrinsicPosition = 0;
+inline constexpr int kCovExtrinsicRotation = 3;
+inline constexpr int kCovTd = 6;
+inline constexpr int kCovReadout = 7;
+inline constexpr int kCovLastState = 8;
+inline constexpr int kCovDim = kCovLastState + kStateDof;
+using PosteriorCovariance = Eigen::Matrix<double, kCovDim, kCovDim>;
+
+// The online history of td: what the estimator knew at an instant.
+struct TimeOffsetEstimate {
+  TimeNs t_ns = 0;  // IMU clock
+  double td_s = 0.0;
+  double sigma_s = 0.0;
+};
+
+struct SolveSummary {
+  int iterations = 0;
+  double initial_cost = 0.0;  // half the sum of squares
+  double final_cost = 0.0;
+  int residuals = 0;
+  int parameters = 0;
+  int landmarks = 0;
+  int observations = 0;
+
+  // Mean squared whitened residual per degree of freedom; 1 is expected where the noise is as stated.
+  double cost_per_dof() const { return residuals > parameters ? 2.0 * final_cost / (residuals - parameters) : 0.0; }
+};
+
+struct EstimateLog {
+  SolveStatus status = SolveStatus::kFailedInitialisation;
+  std::string reason;  // one line where the status is not kConverged
+  std::vector<StampedState> states;
+  RigCalibration calibration;
+  bool td_estimated = false;
+  bool readout_estimated = false;
+  bool extrinsics_estimated = false;
+  PosteriorCovariance covariance = PosteriorCovariance::Zero();
+  std::vector<TimeOffsetEstimate> td_history;
+  SolveSummary summary;
+};
+
+}  // namespace plumbline::core

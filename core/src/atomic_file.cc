@@ -1,0 +1,77 @@
+#include "core/atomic_file.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+namespace plumbline::core {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Close {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, Close>;
+
+[[noreturn]] void fail(const fs::path& path, const char* action) {
+  throw std::system_error(errno, std::generic_category(), fmt::format("{}: cannot {}", path.string(), action));
+}
+
+void write_all(File file, const fs::path& path, std::string_view text) {
+  const bool written = std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
+  if (!written || std::fclose(file.release()) != 0) fail(path, "write");
+}
+
+void sync(const fs::path& path, int flags) {
+  const int fd = ::open(path.c_str(), flags | O_CLOEXEC);
+  if (fd < 0) fail(path, "open");
+  const int failed = ::fsync(fd);
+  const int error = errno;
+  ::close(fd);
+  errno = error;
+  // Some network file systems cannot sync a folder; the rename itself is still atomic there.
+  if (failed != 0 && !(errno == EINVAL && (flags & O_DIRECTORY) != 0)) fail(path, "sync");
+}
+
+}  // namespace
+
+void publish_file(const fs::path& from, const fs::path& to) {
+  sync(from, O_RDONLY);
+  if (std::rename(from.c_str(), to.c_str()) != 0) fail(to, "rename to");
+  sync(to.has_parent_path() ? to.parent_path() : fs::path("."), O_RDONLY | O_DIRECTORY);
+}
+
+void write_file_atomically(const fs::path& path, std::string_view text) {
+  std::error_code none;
+  const fs::file_status status = fs::status(path, none);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    File file(std::fopen(path.c_str(), "we"));
+    if (!file) fail(path, "open");
+    return write_all(std::move(file), path, text);
+  }
+  File file;
+  fs::path temporary;
+  // The name of an earlier process of the same number may have been left behind by a power cut.
+  for (int k = 0; !file; ++k) {
+    temporary = fmt::format("{}.tmp-{}-{}", path.string(), ::getpid(), k);
+    file.reset(std::fopen(temporary.c_str(), "wxe"));
+    if (!file && errno != EEXIST) fail(path, "open");
+  }
+  try {
+    write_all(std::move(file), path, text);
+    publish_file(temporary, path);
+  } catch (...) {
+    fs::remove(temporary, none);
+    throw;
+  }
+}
+
+}  // namespace plumbline::core

@@ -1,0 +1,236 @@
+#include "core/dataset.h"
+
+#include <fmt/format.h>
+
+#include "core/atomic_file.h"
+#include "core/csv.h"
+#include "core/error.h"
+
+namespace plumbline::core {
+
+namespace {
+
+constexpr std::string_view kSchema = "plumbline-dataset/1";
+constexpr std::string_view kImuFile = "mav0/imu0/data.csv";
+constexpr std::string_view kImuSensor = "mav0/imu0/sensor.yaml";
+constexpr std::string_view kFramesFile = "mav0/cam0/data.csv";
+constexpr std::string_view kPointsFile = "mav0/cam0/points.csv";
+constexpr std::string_view kCameraSensor = "mav0/cam0/sensor.yaml";
+
+// meta.yaml: the parts that say how to read the rest.
+struct MetaFile {
+  std::string schema{kSchema};
+  std::string stamp_clock = "imu and camera, each its own; t_imu = t_cam + td";
+  RowReference td_reference_row = RowReference::kMiddle;
+  double gravity_m_s2 = 9.81;
+  std::string config_hash;
+  std::uint64_t seed = 0;
+  std::uint64_t trial = 0;
+};
+
+struct ImuSensorFile {
+  ImuNoise noise;
+};
+
+struct CameraSensorFile {
+  PinholeCamera model;
+  double pixel_sigma_px = 0.0;
+};
+
+void visit(ConfigVisitor& v, MetaFile& c) {
+  v.value("schema", c.schema, "version of this layout");
+  v.value("stamp_clock", c.stamp_clock, "of the files of measurements");
+  v.choice("td_reference_row", c.td_reference_row, kRowReferenceNames, "the row that every td speaks of");
+  v.value("gravity_m_s2", c.gravity_m_s2, non_negative(), "along -z of the world");
+  v.value("config_hash", c.config_hash, "of the scenario");
+  v.value("seed", c.seed, any(), "of the experiment");
+  v.value("trial", c.trial, any(), "of the draw");
+}
+
+void visit(ConfigVisitor& v, ImuSensorFile& c) {
+  v.value("gyroscope_noise_density", c.noise.gyro_noise_density, non_negative(), "rad/s/sqrt(Hz)");
+  v.value("gyroscope_random_walk", c.noise.gyro_bias_walk, non_negative(), "rad/s^2/sqrt(Hz)");
+  v.value("accelerometer_noise_density", c.noise.accel_noise_density, non_negative(), "m/s^2/sqrt(Hz)");
+  v.value("accelerometer_random_walk", c.noise.accel_bias_walk, non_negative(), "m/s^3/sqrt(Hz)");
+}
+
+void visit(ConfigVisitor& v, CameraSensorFile& c) {
+  v.value("width_px", c.model.width_px, at_least(1), "columns");
+  v.value("height_px", c.model.height_px, at_least(1), "rows");
+  v.value("fx_px", c.model.fx_px, positive(), "focal length");
+  v.value("fy_px", c.model.fy_px, positive(), "focal length");
+  v.value("cx_px", c.model.cx_px, any(), "principal point");
+  v.value("cy_px", c.model.cy_px, any(), "principal point");
+  v.value("pixel_sigma_px", c.pixel_sigma_px, non_negative(), "noise of u and v");
+}
+
+}  // namespace
+
+void visit(ConfigVisitor& v, Pose& c) {
+  v.value("position_m", c.p, any(), "origin of the inner frame in the outer");
+  Eigen::Vector4d q = c.q.coeffs();
+  v.value("quaternion_xyzw", q, between(-1.000001, 1.000001), "Hamilton, unit");
+  c.q.coeffs() = q;
+}
+
+void visit(ConfigVisitor& v, RigCalibration& c) {
+  v.section("T_B_C", c.T_B_C, "extrinsics");
+  v.value("td_s", c.td_s, any(), "middle row");
+  v.value("readout_s", c.readout_s, any(), "first row to last");
+}
+
+static void visit(ConfigVisitor& v, State& c) {
+  v.section("T_W_B", c.T_W_B, "pose");
+  v.value("velocity_m_s", c.v_W, any(), "world axes");
+  v.value("gyro_bias_rad_s", c.bias.gyro_rad_s, any(), "body axes");
+  v.value("accel_bias_m_s2", c.bias.accel_m_s2, any(), "body axes");
+}
+
+static void visit(ConfigVisitor& v, StateSigmas& c) {
+  v.value("position_m", c.position_m, positive(), "each axis");
+  v.value("orientation_rad", c.orientation_rad, positive(), "each axis");
+  v.value("velocity_m_s", c.velocity_m_s, positive(), "each axis");
+  v.value("gyro_bias_rad_s", c.gyro_bias_rad_s, positive(), "each axis");
+  v.value("accel_bias_m_s2", c.accel_bias_m_s2, positive(), "each axis");
+}
+
+static void visit(ConfigVisitor& v, CalibrationSigmas& c) {
+  v.value("td_s", c.td_s, non_negative(), "middle row");
+  v.value("readout_s", c.readout_s, non_negative(), "first row to last");
+  v.value("extrinsic_position_m", c.extrinsic_position_m, non_negative(), "each axis");
+  v.value("extrinsic_rotation_rad", c.extrinsic_rotation_rad, non_negative(), "each axis");
+}
+
+static void visit(ConfigVisitor& v, InitialPrior& c) {
+  auto t_ns = static_cast<std::uint64_t>(c.t_ns);
+  v.value("t_ns", t_ns, any(), "IMU clock, the stamp of an IMU sample");
+  c.t_ns = static_cast<TimeNs>(t_ns);
+  v.section("mean", c.mean, "the state at t_ns");
+  v.section("sigma", c.sigma, "of the state");
+  v.section("calibration", c.calibration, "mean");
+  v.section("calibration_sigma", c.calibration_sigma, "0: exactly known");
+  v.section("start", c.start, "where to start iterating");
+  v.section("start_calibration", c.start_calibration, "likewise");
+}
+
+namespace {
+
+void append_yaml(const nlohmann::ordered_json& value, int indent, std::string& out) {
+  for (const auto& [key, child] : value.items()) {
+    out.append(static_cast<std::size_t>(indent), ' ');
+    if (child.is_object()) {
+      out += key + ":\n";
+      append_yaml(child, indent + 2, out);
+    } else {
+      out += fmt::format("{}: {}\n", key, child.dump());
+    }
+  }
+}
+
+template <class Config>
+void write_yaml(const std::filesystem::path& file, const Config& config) {
+  write_file_atomically(file, to_yaml(resolved_config(config)));
+}
+
+template <class Config>
+Config read_yaml(const std::filesystem::path& file) {
+  Config config;
+  read_config(load_config_file(file), "", config);
+  return config;
+}
+
+void check_increasing(const CsvReader& csv, TimeNs previous, TimeNs now, bool first) {
+  if (!first && now <= previous) csv.fail(fmt::format("stamp {} does not come after {}", now, previous));
+}
+
+}  // namespace
+
+std::string to_yaml(const nlohmann::ordered_json& value) {
+  std::string out;
+  append_yaml(value, 0, out);
+  return out;
+}
+
+void write_dataset(const std::filesystem::path& folder, const MeasurementLog& log, const DatasetMeta& meta) {
+  if (std::filesystem::exists(folder) && !(std::filesystem::is_directory(folder) && std::filesystem::is_empty(folder))) {
+    throw DataError(fmt::format("{}: exists and is not an empty folder", folder.generic_string()));
+  }
+  std::filesystem::create_directories(folder / "mav0/imu0");
+  std::filesystem::create_directories(folder / "mav0/cam0");
+
+  std::string imu =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  for (const ImuSample& s : log.imu) {
+    imu += fmt::format("{},{},{},{},{},{},{}\n", s.t_ns, s.gyro_rad_s.x(), s.gyro_rad_s.y(), s.gyro_rad_s.z(),
+                       s.accel_m_s2.x(), s.accel_m_s2.y(), s.accel_m_s2.z());
+  }
+  write_file_atomically(folder / kImuFile, imu);
+  write_yaml(folder / kImuSensor, ImuSensorFile{log.imu_noise});
+
+  std::string frames = "#timestamp [ns] (camera clock)\n";
+  std::string points = "#frame_ns,track_id,u [px],v [px]\n";
+  for (const Frame& frame : log.frames) {
+    frames += fmt::format("{}\n", frame.t_cam_ns);
+    for (const PointObservation& point : frame.points) {
+      points += fmt::format("{},{},{},{}\n", frame.t_cam_ns, point.track_id, point.pixel.x(), point.pixel.y());
+    }
+  }
+  write_file_atomically(folder / kFramesFile, frames);
+  write_file_atomically(folder / kPointsFile, points);
+  write_yaml(folder / kCameraSensor, CameraSensorFile{log.camera, log.pixel_sigma_px});
+  write_yaml(folder / "prior.yaml", log.prior);
+  MetaFile file;
+  file.gravity_m_s2 = log.gravity_m_s2;
+  file.config_hash = meta.config_hash;
+  file.seed = meta.seed;
+  file.trial = meta.trial;
+  write_yaml(folder / "meta.yaml", file);
+}
+
+MeasurementLog read_dataset(const std::filesystem::path& folder) {
+  const MetaFile meta = read_yaml<MetaFile>(folder / "meta.yaml");
+  if (meta.schema != kSchema) {
+    throw DataError(fmt::format("{}: schema is '{}', this program reads '{}'", (folder / "meta.yaml").generic_string(),
+                                meta.schema, kSchema));
+  }
+  if (meta.td_reference_row != RowReference::kMiddle) {
+    throw DataError(fmt::format("{}: td_reference_row must be middle", (folder / "meta.yaml").generic_string()));
+  }
+  const auto camera = read_yaml<CameraSensorFile>(folder / kCameraSensor);
+
+  MeasurementLog log;
+  log.gravity_m_s2 = meta.gravity_m_s2;
+  log.camera = camera.model;
+  log.pixel_sigma_px = camera.pixel_sigma_px;
+  log.imu_noise = read_yaml<ImuSensorFile>(folder / kImuSensor).noise;
+  log.prior = read_yaml<InitialPrior>(folder / "prior.yaml");
+
+  CsvReader imu(folder / kImuFile, 7);
+  while (imu.next()) {
+    const TimeNs t_ns = imu.integer(0);
+    check_increasing(imu, log.imu.empty() ? 0 : log.imu.back().t_ns, t_ns, log.imu.empty());
+    log.imu.push_back({t_ns,
+                       {imu.number(1), imu.number(2), imu.number(3)},
+                       {imu.number(4), imu.number(5), imu.number(6)}});
+  }
+  CsvReader frames(folder / kFramesFile, 1);
+  while (frames.next()) {
+    const TimeNs t_ns = frames.integer(0);
+    check_increasing(frames, log.frames.empty() ? 0 : log.frames.back().t_cam_ns, t_ns, log.frames.empty());
+    log.frames.push_back({t_ns, {}});
+  }
+  CsvReader points(folder / kPointsFile, 4);
+  auto frame = log.frames.begin();
+  while (points.next()) {
+    const TimeNs t_ns = points.integer(0);
+    while (frame != log.frames.end() && frame->t_cam_ns < t_ns) ++frame;
+    if (frame == log.frames.end() || frame->t_cam_ns != t_ns) {
+      points.fail(fmt::format("frame {} is not in {}, or out of order", t_ns, kFramesFile));
+    }
+    frame->points.push_back({points.integer(1), {points.number(2), points.number(3)}});
+  }
+  return log;
+}
+
+}  // namespace plumbline::core

@@ -1,0 +1,65 @@
+// How to estimate. Each field is a key of the YAML file; configs/README.md documents them all.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "core/calibration.h"
+#include "core/config.h"
+
+namespace plumbline::estimator {
+
+enum class EstimatorType { kBatch };
+inline constexpr std::array<std::string_view, 1> kEstimatorTypeNames = {"batch"};
+enum class TimingModel { kPropagated };
+inline constexpr std::array<std::string_view, 1> kTimingModelNames = {"propagated"};
+enum class ResidualType { kPinhole };
+inline constexpr std::array<std::string_view, 1> kResidualTypeNames = {"pinhole"};
+enum class LandmarkType { kBearingInverseDepth };
+inline constexpr std::array<std::string_view, 1> kLandmarkTypeNames = {"bearing_inverse_depth"};
+enum class Initialisation { kPrior };
+inline constexpr std::array<std::string_view, 1> kInitialisationNames = {"prior"};
+enum class LinearSolver { kAutomatic, kSparseSchur, kDenseSchur };
+inline constexpr std::array<std::string_view, 3> kLinearSolverNames = {"automatic", "sparse_schur", "dense_schur"};
+
+// The estimator's own belief of the IMU's noise; the data sheet's where absent.
+struct ImuNoiseOverride {
+  std::optional<double> gyro_noise_density;
+  std::optional<double> gyro_bias_walk;
+  std::optional<double> accel_noise_density;
+  std::optional<double> accel_bias_walk;
+};
+
+// What is free; the rest is held at the prior's mean.
+struct EstimateWhat {
+  bool td = true;
+  bool readout = true;
+  bool extrinsics = true;
+};
+
+struct EstimatorConfig {
+  EstimatorType type = EstimatorType::kBatch;
+  TimingModel timing = TimingModel::kPropagated;
+  ResidualType residual = ResidualType::kPinhole;
+  LandmarkType landmark = LandmarkType::kBearingInverseDepth;
+  Initialisation initialisation = Initialisation::kPrior;
+  LinearSolver solver = LinearSolver::kAutomatic;
+  double keyframe_rate_hz = 10.0;
+  std::optional<double> pixel_sigma_px;
+  ImuNoiseOverride imu;
+  EstimateWhat estimate;
+  int max_iterations = 50;
+  double max_cost_per_dof = 2.0;
+};
+
+void visit(core::ConfigVisitor& v, EstimatorConfig& c);
+
+// The noise that the estimator believes in: its own where given, else the data sheet's.
+struct BelievedNoise {
+  core::ImuNoise imu;
+  double pixel_sigma_px = 0.0;
+};
+BelievedNoise believed_noise(const EstimatorConfig& config, const core::ImuNoise& imu_noise, double pixel_sigma_px);
+
+}  // namespace plumbline::estimator

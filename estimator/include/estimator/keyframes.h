@@ -1,0 +1,30 @@
+// Which frames enter the estimate, and the tracks of points through them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/measurements.h"
+
+namespace plumbline::estimator {
+
+// Indices of the frames at a rate of at most rate_hz: of each period, counted from the first frame, the first frame.
+std::vector<std::size_t> select_keyframes(const std::vector<core::Frame>& frames, double rate_hz);
+
+struct TrackObservation {
+  std::size_t keyframe = 0;  // index into the selection
+  Eigen::Vector2d pixel;
+};
+
+// The first observation is the anchor's.
+struct Track {
+  std::int64_t id = 0;
+  std::vector<TrackObservation> observations;
+};
+
+// Tracks that at least two keyframes see (a point that is seen once says nothing of the motion), by their ids.
+std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes);
+
+}  // namespace plumbline::estimator

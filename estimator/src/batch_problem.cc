@@ -1,0 +1,198 @@
+#include "estimator/batch_problem.h"
+
+#include <algorithm>
+#include <array>
+
+#include <ceres/solver.h>
+
+#include "estimator/factors/imu_factor.h"
+#include "estimator/factors/point_factors.h"
+#include "estimator/factors/prior_factors.h"
+#include "estimator/posterior.h"
+
+namespace plumbline::estimator {
+
+BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values)
+    : input_(input),
+      start_(values),
+      extrinsics_(pack(values.calibration.T_B_C)),
+      td_s_(values.calibration.td_s),
+      readout_s_(values.calibration.readout_s) {
+  for (const core::State& state : values.states) states_.push_back(pack(state));
+
+  ceres::Problem::Options options;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  problem_ = std::make_unique<ceres::Problem>(options);
+  for (StateBlock& state : states_) problem_->AddParameterBlock(state.data(), kStateSize, &state_manifold_);
+  problem_->AddParameterBlock(extrinsics_.data(), kPoseSize, &pose_manifold_);
+  problem_->AddParameterBlock(&td_s_, 1);
+  problem_->AddParameterBlock(&readout_s_, 1);
+  if (!input_.config.estimate.extrinsics) problem_->SetParameterBlockConstant(extrinsics_.data());
+  if (!input_.config.estimate.td) problem_->SetParameterBlockConstant(&td_s_);
+  if (!input_.config.estimate.readout) problem_->SetParameterBlockConstant(&readout_s_);
+
+  add_priors();
+  add_inertial_factors();
+  add_points();
+}
+
+void BatchProblem::add_priors() {
+  const core::InitialPrior& prior = input_.log.prior;
+  const core::CalibrationSigmas& sigma = prior.calibration_sigma;
+  problem_->AddResidualBlock(new StatePriorFactor(prior.mean, prior.sigma), nullptr, states_.front().data());
+  if (input_.config.estimate.extrinsics) {
+    problem_->AddResidualBlock(new ExtrinsicsPriorFactor(prior.calibration.T_B_C, sigma.extrinsic_position_m,
+                                                         sigma.extrinsic_rotation_rad),
+                               nullptr, extrinsics_.data());
+  }
+  if (input_.config.estimate.td) {
+    problem_->AddResidualBlock(new ScalarPriorFactor(prior.calibration.td_s, sigma.td_s), nullptr, &td_s_);
+  }
+  if (input_.config.estimate.readout) {
+    problem_->AddResidualBlock(new ScalarPriorFactor(prior.calibration.readout_s, sigma.readout_s), nullptr,
+                               &readout_s_);
+  }
+}
+
+void BatchProblem::add_inertial_factors() {
+  const std::span<const core::ImuSample> imu(input_.log.imu);
+  for (std::size_t i = 0; i + 1 < states_.size(); ++i) {
+    const std::size_t first = start_.samples[i];
+    const std::size_t last = start_.samples[i + 1];
+    const Preintegration preintegration =
+        preintegrate(imu.subspan(first, last - first + 1), start_.states[i].bias, input_.noise.imu);
+    problem_->AddResidualBlock(new ImuFactor(preintegration, input_.log.gravity_m_s2), nullptr, states_[i].data(),
+                               states_[i + 1].data());
+  }
+}
+
+void BatchProblem::add_points() {
+  // How far observations may move from their states: half the readout, half a sample, and td and readout five sigma
+  // off.
+  const core::CalibrationSigmas& sigma = input_.log.prior.calibration_sigma;
+  const double sample_s = core::to_seconds(input_.log.imu[1].t_ns - input_.log.imu[0].t_ns);
+  const double reach_s =
+      0.5 * std::abs(start_.calibration.readout_s) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
+  std::vector<FrameTiming> timings;
+  for (std::size_t k = 0; k + 1 < states_.size(); ++k) {
+    const std::size_t sample = start_.samples[k + 1];
+    const core::TimeNs t_cam_ns = input_.log.frames[input_.keyframes[k]].t_cam_ns;
+    timings.push_back(
+        {std::make_shared<LocalMotion>(input_.log.imu, sample, reach_s, start_.states[k + 1].bias),
+         core::to_seconds(t_cam_ns - input_.log.imu[sample].t_ns)});
+  }
+
+  const CameraModel model{input_.log.camera, input_.noise.pixel_sigma_px, input_.log.gravity_m_s2};
+  landmarks_.reserve(input_.tracks.size());  // parameter blocks must not move
+  for (std::size_t t = 0; t < input_.tracks.size(); ++t) {
+    if (!start_.landmarks[t]) continue;
+    const std::vector<TrackObservation>& observations = input_.tracks[t].observations;
+    Eigen::Vector3d& landmark = landmarks_.emplace_back(*start_.landmarks[t]);
+    const std::size_t anchor = observations.front().keyframe;
+
+    std::vector<std::pair<std::unique_ptr<PropagatedPointFactor>, std::size_t>> factors;
+    bool usable = true;
+    for (auto o = observations.begin() + 1; o != observations.end() && o->keyframe < timings.size(); ++o) {
+      auto factor =
+          std::make_unique<PropagatedPointFactor>(model, timings[anchor], timings[o->keyframe], o->pixel);
+      const std::array<const double*, 6> blocks = {states_[anchor + 1].data(), states_[o->keyframe + 1].data(),
+                                                   extrinsics_.data(),         &td_s_,
+                                                   &readout_s_,                landmark.data()};
+      Eigen::Vector2d residual;
+      usable = usable && factor->Evaluate(blocks.data(), residual.data(), nullptr);
+      factors.emplace_back(std::move(factor), o->keyframe);
+    }
+    if (!usable || factors.empty()) {
+      landmarks_.pop_back();
+      continue;
+    }
+    problem_->AddResidualBlock(new AnchorPointFactor(model, observations.front().pixel), nullptr, landmark.data());
+    for (auto& [factor, keyframe] : factors) {
+      problem_->AddResidualBlock(factor.release(), nullptr, states_[anchor + 1].data(), states_[keyframe + 1].data(),
+                                 extrinsics_.data(), &td_s_, &readout_s_, landmark.data());
+    }
+    landmark_tracks_.push_back(t);
+    observations_ += 1 + static_cast<int>(factors.size());
+  }
+}
+
+BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
+  ceres::Solver::Options ceres_options;
+  // Tracks of seconds leave few zeros between the states of a short recording, and dense Cholesky has less to keep
+  // books of.
+  constexpr std::size_t kDenseUpTo = 3000;
+  const bool dense = input_.config.solver == LinearSolver::kDenseSchur ||
+                     (input_.config.solver == LinearSolver::kAutomatic &&
+                      states_.size() * core::kStateDof <= kDenseUpTo);
+  ceres_options.linear_solver_type = dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  ceres_options.dense_linear_algebra_library_type = ceres::LAPACK;
+  ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (Eigen::Vector3d& landmark : landmarks_) ordering->AddElementToGroup(landmark.data(), 0);
+  for (StateBlock& state : states_) ordering->AddElementToGroup(state.data(), 1);
+  for (double* block : {extrinsics_.data(), &td_s_, &readout_s_}) ordering->AddElementToGroup(block, 1);
+  ceres_options.linear_solver_ordering = ordering;
+  ceres_options.num_threads = 1;
+  ceres_options.max_num_iterations = options.max_iterations;
+  ceres_options.max_solver_time_in_seconds = 1e9;  // never: a result must not depend on the machine's load
+  ceres_options.function_tolerance = options.function_tolerance;
+  ceres_options.gradient_tolerance = 1e-14;
+  ceres_options.parameter_tolerance = 1e-12;
+  ceres_options.initial_trust_region_radius = options.initial_trust_region_radius;
+  ceres_options.logging_type = ceres::SILENT;
+
+  ceres::Solver::Summary ceres_summary;
+  ceres::Solve(ceres_options, problem_.get(), &ceres_summary);
+
+  Outcome outcome;
+  switch (ceres_summary.termination_type) {
+    case ceres::CONVERGENCE: outcome.status = core::SolveStatus::kConverged; break;
+    case ceres::NO_CONVERGENCE: outcome.status = core::SolveStatus::kIterationLimit; break;
+    default: outcome.status = core::SolveStatus::kDiverged;
+  }
+  outcome.summary = {.iterations = static_cast<int>(ceres_summary.iterations.size()) - 1,
+                     .initial_cost = ceres_summary.initial_cost,
+                     .final_cost = ceres_summary.final_cost,
+                     .residuals = ceres_summary.num_residuals_reduced,
+                     .parameters = ceres_summary.num_effective_parameters_reduced,
+                     .landmarks = static_cast<int>(landmarks_.size()),
+                     .observations = observations_};
+  return outcome;
+}
+
+BatchValues BatchProblem::values() const {
+  BatchValues values = start_;
+  values.calibration = {.T_B_C = unpack_pose(extrinsics_.data()), .td_s = td_s_, .readout_s = readout_s_};
+  for (std::size_t i = 0; i < states_.size(); ++i) values.states[i] = unpack_state(states_[i].data());
+  std::fill(values.landmarks.begin(), values.landmarks.end(), std::nullopt);
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) values.landmarks[landmark_tracks_[i]] = landmarks_[i];
+  return values;
+}
+
+std::optional<core::PosteriorCovariance> BatchProblem::posterior_covariance() const {
+  // Blocks that are held constant have no columns; `wanted` says which row of the answer each free column is.
+  std::vector<double*> blocks;
+  std::vector<int> wanted;
+  const auto add = [&](const double* block, int size, int row) {
+    blocks.push_back(const_cast<double*>(block));
+    for (int i = 0; i < size; ++i) wanted.push_back(row + i);
+  };
+  if (input_.config.estimate.extrinsics) add(extrinsics_.data(), 6, core::kCovExtrinsicPosition);
+  if (input_.config.estimate.td) add(&td_s_, 1, core::kCovTd);
+  if (input_.config.estimate.readout) add(&readout_s_, 1, core::kCovReadout);
+  add(states_.back().data(), core::kStateDof, core::kCovLastState);
+  for (std::size_t i = 0; i + 1 < states_.size(); ++i) blocks.push_back(const_cast<double*>(states_[i].data()));
+  for (const Eigen::Vector3d& landmark : landmarks_) blocks.push_back(const_cast<double*>(landmark.data()));
+
+  const auto covariance = leading_covariance(*problem_, blocks, static_cast<int>(wanted.size()));
+  if (!covariance) return std::nullopt;
+  core::PosteriorCovariance result = core::PosteriorCovariance::Zero();
+  for (int r = 0; r < static_cast<int>(wanted.size()); ++r) {
+    for (int c = 0; c < static_cast<int>(wanted.size()); ++c) {
+      result(wanted[static_cast<std::size_t>(r)], wanted[static_cast<std::size_t>(c)]) = (*covariance)(r, c);
+    }
+  }
+  return result;
+}
+
+}  // namespace plumbline::estimator

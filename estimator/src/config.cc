@@ -1,0 +1,47 @@
+#include "estimator/config.h"
+
+namespace plumbline::estimator {
+
+using core::positive;
+
+// Argument-dependent lookup finds these; it does not look into an unnamed namespace.
+static void visit(core::ConfigVisitor& v, ImuNoiseOverride& c) {
+  const std::string_view absent = "scenario";
+  v.value("gyro_noise_density_rad_s_sqrt_hz", c.gyro_noise_density, positive(), absent, "white noise it believes in");
+  v.value("gyro_bias_walk_rad_s2_sqrt_hz", c.gyro_bias_walk, positive(), absent, "random walk it believes in");
+  v.value("accel_noise_density_m_s2_sqrt_hz", c.accel_noise_density, positive(), absent, "white noise it believes in");
+  v.value("accel_bias_walk_m_s3_sqrt_hz", c.accel_bias_walk, positive(), absent, "random walk it believes in");
+}
+
+static void visit(core::ConfigVisitor& v, EstimateWhat& c) {
+  v.value("td", c.td, "the time offset");
+  v.value("readout", c.readout, "the readout time");
+  v.value("extrinsics", c.extrinsics, "T_B_C");
+}
+
+void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
+  v.choice("type", c.type, kEstimatorTypeNames, "`batch`: full maximum a posteriori");
+  v.choice("timing", c.timing, kTimingModelNames,
+           "camera timing; `propagated`: the pose at the observation's own time, by the IMU");
+  v.choice("residual", c.residual, kResidualTypeNames, "of a point; `pinhole`: pixels");
+  v.choice("landmark", c.landmark, kLandmarkTypeNames, "`bearing_inverse_depth`: 3 dof, bearing and inverse depth");
+  v.choice("initialisation", c.initialisation, kInitialisationNames, "`prior`: starts from the scenario's prior");
+  v.choice("solver", c.solver, kLinearSolverNames, "of Ceres, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
+  v.value("keyframe_rate_hz", c.keyframe_rate_hz, positive(), "only keyframes' observations enter");
+  v.value("pixel_sigma_px", c.pixel_sigma_px, positive(), "scenario", "pixel noise it believes in");
+  v.section("imu", c.imu, "IMU noise it believes in; must be given where the scenario's is 0");
+  v.section("estimate", c.estimate, "what is free; the rest is held at the prior's mean");
+  v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");
+  v.value("max_cost_per_dof", c.max_cost_per_dof, positive(),
+          "a mean squared whitened residual above it is a false minimum: a failed trial");
+}
+
+BelievedNoise believed_noise(const EstimatorConfig& config, const core::ImuNoise& imu_noise, double pixel_sigma_px) {
+  return {.imu = {.gyro_noise_density = config.imu.gyro_noise_density.value_or(imu_noise.gyro_noise_density),
+                  .gyro_bias_walk = config.imu.gyro_bias_walk.value_or(imu_noise.gyro_bias_walk),
+                  .accel_noise_density = config.imu.accel_noise_density.value_or(imu_noise.accel_noise_density),
+                  .accel_bias_walk = config.imu.accel_bias_walk.value_or(imu_noise.accel_bias_walk)},
+          .pixel_sigma_px = config.pixel_sigma_px.value_or(pixel_sigma_px)};
+}
+
+}  // namespace plumbline::estimator

@@ -1,0 +1,39 @@
+#include "estimator/keyframes.h"
+
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace plumbline::estimator {
+
+std::vector<std::size_t> select_keyframes(const std::vector<core::Frame>& frames, double rate_hz) {
+  // Stamps are rounded to nanoseconds; a frame this little before its period belongs to it.
+  constexpr double kToleranceS = 1e-6;
+  std::vector<std::size_t> keyframes;
+  double next_period = 0.0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const double periods = (core::to_seconds(frames[i].t_cam_ns - frames.front().t_cam_ns) + kToleranceS) * rate_hz;
+    if (periods < next_period) continue;
+    keyframes.push_back(i);
+    next_period = std::floor(periods) + 1.0;
+  }
+  return keyframes;
+}
+
+std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes) {
+  std::map<std::int64_t, Track> by_id;
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    for (const core::PointObservation& point : frames[keyframes[k]].points) {
+      Track& track = by_id[point.track_id];
+      track.id = point.track_id;
+      track.observations.push_back({k, point.pixel});
+    }
+  }
+  std::vector<Track> tracks;
+  for (auto& [id, track] : by_id) {
+    if (track.observations.size() >= 2) tracks.push_back(std::move(track));
+  }
+  return tracks;
+}
+
+}  // namespace plumbline::estimator

@@ -1,0 +1,62 @@
+// What a trial is measured by. A new metric is one line here and its value in eval/evaluate.h.
+//
+//   name                  value                                              NEES (never after alignment)
+//   ate_position_m        RMSE over the trajectory, aligned                  -
+//   ate_rotation_deg      likewise, geodesic angle                           -
+//   td_error_s            estimate - truth, middle row                       1 dof, where estimated
+//   readout_error_s       estimate - truth                                   1 dof, where estimated
+//   extrinsic_position_m  |p_est - p_true| of T_B_C                          3 dof, where estimated
+//   extrinsic_rotation_deg  |Log(R_true^T R_est)| of T_B_C                   3 dof, where estimated
+//   extrinsic             m, as extrinsic_position_m                         6 dof, [position | orientation] jointly
+//   final_pose            m, |p_est - p_true| of the last state, unaligned   6 dof, [position | orientation] jointly
+//   final_velocity        m/s, norm of the error of the last state           3 dof
+//   final_bias            rad/s, norm of the last gyroscope bias' error      6 dof, [gyroscope | accelerometer] jointly
+// A joint block's units do not mix in a norm, so its value is that of its first three components.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/lie.h"
+
+namespace plumbline::eval {
+
+struct Metric {
+  std::string name;
+  double value = 0.0;
+  std::optional<double> nees = std::nullopt;
+  int nees_dof = 0;  // 0 where there is no NEES
+};
+
+struct MetricInfo {
+  std::string_view name;
+  std::string_view label;   // in tables, with the unit
+  double table_unit = 1.0;  // what a value is multiplied by in tables
+  bool is_signed = false;   // a Gaussian error of mean 0 where the estimator is consistent
+  bool in_table = true;     // false: the value repeats another metric's, only the NEES is new
+};
+
+inline constexpr std::array<MetricInfo, 10> kMetrics = {{
+    {"ate_position_m", "ATE position [mm]", 1e3},
+    {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
+    {"td_error_s", "td error [us]", 1e6, true},
+    {"readout_error_s", "readout error [us]", 1e6, true},
+    {"extrinsic_position_m", "extrinsic position [mm]", 1e3},
+    {"extrinsic_rotation_deg", "extrinsic rotation [deg]", 1.0},
+    {"extrinsic", "extrinsic, joint", 1e3, false, false},
+    {"final_pose", "final pose [mm]", 1e3},
+    {"final_velocity", "final velocity [mm/s]", 1e3},
+    {"final_bias", "final gyro bias [deg/h]", 3600.0 * core::kDegreesPerRadian},
+}};
+
+// A metric that is not listed is shown under its own name and unit.
+constexpr MetricInfo metric_info(std::string_view name) {
+  for (const MetricInfo& info : kMetrics) {
+    if (info.name == name) return info;
+  }
+  return {name, name};
+}
+
+}  // namespace plumbline::eval

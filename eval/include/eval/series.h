@@ -1,0 +1,48 @@
+// A trial as it went, on a fixed grid of at most kSeriesPoints instants (the estimated states nearest to them), for
+// plots and for looking into a single run.
+#pragma once
+
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "core/estimate.h"
+#include "core/lie.h"
+#include "core/time.h"
+#include "eval/trajectory_error.h"
+
+namespace plumbline::eval {
+
+inline constexpr int kSeriesPoints = 100;
+
+struct SeriesPoint {
+  double t_s = 0.0;    // since the first estimated state
+  PoseError error;     // after alignment
+  core::Pose aligned;  // the estimated T_W_B after alignment
+  core::Pose truth;    // T_W_B
+};
+
+struct TimeOffsetPoint {
+  double t_s = 0.0;  // since the first estimated state
+  double td_error_s = 0.0;
+  double sigma_s = 0.0;
+};
+
+struct Series {
+  std::vector<SeriesPoint> points;
+  std::vector<TimeOffsetPoint> td;  // empty where the estimator keeps no history
+};
+
+// The indices of at most `points` of the sorted stamps: those nearest to a uniform grid from the first to the last.
+std::vector<int> grid_indices(const std::vector<core::TimeNs>& stamps, int points = kSeriesPoints);
+
+// `errors` of `pairs`, which must be ok; td_s is the true one.
+Series make_series(const std::vector<PosePair>& pairs, const TrajectoryErrors& errors,
+                   const std::vector<core::TimeOffsetEstimate>& td_history, double td_s);
+
+// Columns as arrays: {"t_s": [...], "position_error_m": [x, y, z], "rotation_error_rad": [x, y, z],
+//  "estimate": [px, py, pz, qx, qy, qz, qw], "truth": likewise, "td": {"t_s", "td_error_s", "sigma_s"}},
+// each letter an array; td only where there is a history.
+nlohmann::ordered_json to_json(const Series& series);
+
+}  // namespace plumbline::eval

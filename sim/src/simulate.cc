@@ -1,0 +1,38 @@
+#include "sim/simulate.h"
+
+#include <utility>
+
+#include "sim/camera_sensor.h"
+#include "sim/imu_sensor.h"
+#include "sim/prior.h"
+#include "sim/world.h"
+
+namespace plumbline::sim {
+
+Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
+  const auto trajectory = make_trajectory(config.trajectory, config.duration_s, id);
+  std::vector<Eigen::Vector3d> landmarks = make_world(config.world, *trajectory, config.duration_s, id);
+  ImuRecording imu = simulate_imu(*trajectory, config.imu, config.gravity_m_s2, config.duration_s, id);
+  CameraRecording camera = simulate_camera(*trajectory, landmarks, config, kCameraLeadS, id);
+
+  Simulation s;
+  s.truth.calibration = config.calibration();
+  s.truth.states.reserve(imu.samples.size());
+  for (std::size_t i = 0; i < imu.samples.size(); ++i) {
+    const Kinematics k = trajectory->at(core::to_seconds(imu.samples[i].t_ns));
+    s.truth.states.push_back({imu.samples[i].t_ns, {.T_W_B = k.T_W_B, .v_W = k.v_W, .bias = imu.biases[i]}});
+  }
+  s.truth.landmarks_W = std::move(landmarks);
+  s.truth.track_landmark = std::move(camera.track_landmark);
+
+  s.measurements = {.imu = std::move(imu.samples),
+                    .frames = std::move(camera.frames),
+                    .prior = make_prior(s.truth, config, id),
+                    .camera = config.camera.model,
+                    .imu_noise = config.imu.noise,
+                    .pixel_sigma_px = config.camera.pixel_sigma_px,
+                    .gravity_m_s2 = config.gravity_m_s2};
+  return s;
+}
+
+}  // namespace plumbline::sim

@@ -1,0 +1,282 @@
+#include "eval/evaluate.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+#include "core/lie.h"
+#include "core/state.h"
+
+namespace plumbline::eval {
+namespace {
+
+using core::EstimateLog;
+using core::TimeNs;
+
+constexpr TimeNs kImuStep = 5'000'000;
+constexpr int kStates = 250;
+constexpr int kStatesEvery = 20;  // IMU samples
+
+sim::GroundTruth make_truth() {
+  sim::GroundTruth truth;
+  truth.calibration = {.T_B_C = {core::exp_quaternion(Eigen::Vector3d(1.0, -0.5, 0.3)), {0.05, -0.02, 0.01}},
+                       .td_s = 0.01,
+                       .readout_s = 0.02};
+  for (int k = 0; k < kStates * kStatesEvery; ++k) {
+    const TimeNs t_ns = 1403636580'000000000 + k * kImuStep;
+    const double u = core::to_seconds(k * kImuStep);
+    core::State x;
+    x.T_W_B = {core::exp_quaternion(Eigen::Vector3d(0.4 * std::sin(u), 0.3, 0.2 * u)),
+               {2.0 * std::cos(u), std::sin(1.3 * u), 0.2 * u}};
+    x.v_W = {-2.0 * std::sin(u), 1.3 * std::cos(1.3 * u), 0.2};
+    x.bias = {{0.01, 0.02, -0.01}, {0.1, -0.2, 0.05}};
+    truth.states.push_back({t_ns, x});
+  }
+  return truth;
+}
+
+// A positive definite matrix with correlations between all blocks.
+core::PosteriorCovariance make_covariance() {
+  core::PosteriorCovariance A;
+  for (int i = 0; i < core::kCovDim; ++i) {
+    for (int j = 0; j < core::kCovDim; ++j) A(i, j) = std::sin(1.0 + 7.0 * i + 3.0 * j * j) + (i == j ? 3.0 : 0.0);
+  }
+  return 1e-6 * A * A.transpose();
+}
+
+EstimateLog perfect(const sim::GroundTruth& truth) {
+  EstimateLog estimate;
+  estimate.status = core::SolveStatus::kConverged;
+  for (std::size_t k = 0; k < truth.states.size(); k += kStatesEvery) estimate.states.push_back(truth.states[k]);
+  estimate.calibration = truth.calibration;
+  estimate.td_estimated = true;
+  estimate.readout_estimated = true;
+  estimate.extrinsics_estimated = true;
+  estimate.covariance = make_covariance();
+  estimate.summary = {
+      .iterations = 9, .final_cost = 50.0, .residuals = 120, .parameters = 20, .landmarks = 7, .observations = 60};
+  return estimate;
+}
+
+const Metric& metric(const TrialResult& result, std::string_view name) {
+  for (const Metric& m : result.metrics) {
+    if (m.name == name) return m;
+  }
+  throw std::out_of_range(std::string(name));
+}
+
+class Evaluate : public testing::Test {
+ protected:
+  Evaluate() {
+    error_.setLinSpaced(-3e-3, 4e-3);
+    core::RigCalibration& c = estimate_.calibration;
+    c.T_B_C.p += error_.segment<3>(core::kCovExtrinsicPosition);
+    c.T_B_C.q = c.T_B_C.q * core::exp_quaternion(error_.segment<3>(core::kCovExtrinsicRotation));
+    c.td_s += error_(core::kCovTd);
+    c.readout_s += error_(core::kCovReadout);
+    core::State& last = estimate_.states.back().state;
+    last = core::plus(last, error_.segment<core::kStateDof>(core::kCovLastState));
+  }
+
+  TrialResult evaluate(Alignment alignment = Alignment::kPosyaw) const {
+    return eval::evaluate(estimate_, truth_, {.alignment = alignment});
+  }
+
+  void expect_unusable(const std::string& reason) const {
+    const TrialResult result = evaluate();
+    EXPECT_FALSE(result.ok);
+    EXPECT_EQ(result.status, "unusable");
+    EXPECT_EQ(result.reason, reason);
+    EXPECT_TRUE(result.metrics.empty());
+    EXPECT_TRUE(result.series.points.empty());
+  }
+
+  sim::GroundTruth truth_ = make_truth();
+  EstimateLog estimate_ = perfect(truth_);
+  Eigen::Matrix<double, core::kCovDim, 1> error_;  // of estimate_, in the order of its covariance
+};
+
+TEST_F(Evaluate, ErrorsAreEstimateMinusTruth) {
+  const TrialResult result = evaluate();
+  ASSERT_TRUE(result.ok) << result.reason;
+  EXPECT_EQ(result.status, "converged");
+  EXPECT_NEAR(metric(result, "td_error_s").value, error_(core::kCovTd), 1e-15);
+  EXPECT_NEAR(metric(result, "readout_error_s").value, error_(core::kCovReadout), 1e-15);
+  EXPECT_NEAR(metric(result, "extrinsic_position_m").value, error_.segment<3>(0).norm(), 1e-15);
+  EXPECT_NEAR(metric(result, "extrinsic_rotation_deg").value, error_.segment<3>(3).norm() * core::kDegreesPerRadian,
+              1e-12);
+  EXPECT_NEAR(metric(result, "extrinsic").value, error_.segment<3>(0).norm(), 1e-15);
+  EXPECT_NEAR(metric(result, "final_pose").value, error_.segment<3>(8).norm(), 1e-12);
+  EXPECT_NEAR(metric(result, "final_velocity").value, error_.segment<3>(14).norm(), 1e-12);
+  EXPECT_NEAR(metric(result, "final_bias").value, error_.segment<3>(17).norm(), 1e-14);
+}
+
+TEST_F(Evaluate, HoldsEveryMetricOfTheRegistryInItsOrder) {
+  const TrialResult result = evaluate();
+  ASSERT_EQ(result.metrics.size(), kMetrics.size());
+  for (std::size_t i = 0; i < kMetrics.size(); ++i) EXPECT_EQ(result.metrics[i].name, kMetrics[i].name);
+}
+
+TEST_F(Evaluate, NeesIsOfTheRightBlockAndDimension) {
+  struct Block {
+    std::string_view name;
+    int offset;
+    int dof;
+  };
+  const TrialResult result = evaluate();
+  for (const Block& b : {Block{"extrinsic_position_m", 0, 3}, Block{"extrinsic_rotation_deg", 3, 3},
+                         Block{"extrinsic", 0, 6}, Block{"td_error_s", 6, 1}, Block{"readout_error_s", 7, 1},
+                         Block{"final_pose", 8, 6}, Block{"final_velocity", 14, 3}, Block{"final_bias", 17, 6}}) {
+    const Eigen::VectorXd e = error_.segment(b.offset, b.dof);
+    const Eigen::MatrixXd P = estimate_.covariance.block(b.offset, b.offset, b.dof, b.dof);
+    const Metric& m = metric(result, b.name);
+    EXPECT_EQ(m.nees_dof, b.dof) << b.name;
+    EXPECT_NEAR(m.nees.value() / e.dot(P.ldlt().solve(e)), 1.0, 1e-8) << b.name;
+  }
+  EXPECT_FALSE(metric(result, "ate_position_m").nees.has_value());
+  EXPECT_FALSE(metric(result, "ate_rotation_deg").nees.has_value());
+}
+
+TEST_F(Evaluate, OnlyTheAteIsAligned) {
+  const core::Pose T{core::exp_quaternion(Eigen::Vector3d(0.0, 0.0, 0.3)), {1.0, 2.0, 3.0}};
+  for (auto& stamped : estimate_.states) stamped.state.T_W_B = T * stamped.state.T_W_B;
+  const TrialResult posyaw = evaluate(Alignment::kPosyaw);
+  const TrialResult none = evaluate(Alignment::kNone);
+  EXPECT_LT(metric(posyaw, "ate_position_m").value, 1e-3);
+  EXPECT_GT(metric(none, "ate_position_m").value, 1.0);
+  EXPECT_NEAR(metric(none, "ate_rotation_deg").value, 0.3 * core::kDegreesPerRadian, 0.1);
+  EXPECT_EQ(metric(posyaw, "final_pose").value, metric(none, "final_pose").value);
+  EXPECT_EQ(metric(posyaw, "final_pose").nees, metric(none, "final_pose").nees);
+  EXPECT_GT(metric(posyaw, "final_pose").value, 1.0);
+}
+
+TEST_F(Evaluate, WithoutAnEstimateThereIsNoNees) {
+  estimate_.td_estimated = false;
+  estimate_.readout_estimated = false;
+  estimate_.extrinsics_estimated = false;
+  for (const int held : {core::kCovTd, core::kCovReadout}) {
+    estimate_.covariance.row(held).setZero();
+    estimate_.covariance.col(held).setZero();
+  }
+  const int bias = core::kCovLastState + core::kGyroBias;
+  estimate_.covariance.middleRows<6>(bias).setZero();
+  estimate_.covariance.middleCols<6>(bias).setZero();
+  const TrialResult result = evaluate();
+  ASSERT_TRUE(result.ok) << result.reason;
+  for (const char* name :
+       {"td_error_s", "readout_error_s", "extrinsic", "extrinsic_position_m", "extrinsic_rotation_deg", "final_bias"}) {
+    EXPECT_FALSE(metric(result, name).nees.has_value()) << name;
+    EXPECT_EQ(metric(result, name).nees_dof, 0) << name;
+  }
+  EXPECT_NEAR(metric(result, "td_error_s").value, error_(core::kCovTd), 1e-15);
+  EXPECT_TRUE(metric(result, "final_pose").nees.has_value());
+}
+
+TEST_F(Evaluate, AnEstimatorWithoutCovarianceIsScoredWithoutNees) {
+  estimate_.covariance.setZero();
+  const TrialResult result = evaluate();
+  ASSERT_TRUE(result.ok) << result.reason;
+  for (const Metric& m : result.metrics) EXPECT_FALSE(m.nees.has_value()) << m.name;
+}
+
+TEST_F(Evaluate, ASingularCovarianceFailsTheTrial) {
+  estimate_.covariance.row(core::kCovTd).setZero();
+  estimate_.covariance.col(core::kCovTd).setZero();
+  expect_unusable("the covariance of td_error_s is singular or indefinite");
+}
+
+TEST_F(Evaluate, APartlyZeroBlockFailsTheTrial) {
+  const int accel = core::kCovLastState + core::kAccelBias;
+  estimate_.covariance.middleRows<3>(accel).setZero();
+  estimate_.covariance.middleCols<3>(accel).setZero();
+  expect_unusable("the covariance of final_bias is singular or indefinite");
+}
+
+TEST_F(Evaluate, ValuesThatAreNotFiniteFailTheTrial) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const EstimateLog sound = estimate_;
+  estimate_.states[4].state.T_W_B.p.x() = kNan;
+  expect_unusable("pose 4 is not finite");
+  const std::string rest = "a velocity, bias, calibration or covariance is not finite";
+  estimate_ = sound;
+  estimate_.states[4].state.bias.accel_m_s2.x() = kNan;
+  expect_unusable(rest);
+  estimate_ = sound;
+  estimate_.calibration.td_s = kNan;
+  expect_unusable(rest);
+  estimate_ = sound;
+  estimate_.covariance(2, 3) = kNan;
+  expect_unusable(rest);
+  estimate_ = sound;
+  estimate_.summary.final_cost = kNan;
+  expect_unusable("the final cost is not finite");
+}
+
+TEST_F(Evaluate, StampsThatCannotBeScoredFailTheTrial) {
+  const EstimateLog sound = estimate_;
+  estimate_.states[5].t_ns = estimate_.states[4].t_ns;
+  expect_unusable("pose 5 has a duplicate stamp");
+  estimate_ = sound;
+  std::swap(estimate_.states[5], estimate_.states[6]);
+  expect_unusable("pose 6 has an unsorted stamp");
+  estimate_ = sound;
+  estimate_.states.resize(2);
+  expect_unusable("2 poses where 3 are needed");
+  estimate_ = sound;
+  estimate_.states.clear();
+  expect_unusable("0 poses where 3 are needed");
+  estimate_ = sound;
+  estimate_.states.back().t_ns += 10 * core::kNsPerSecond;
+  expect_unusable("the state at " + std::to_string(estimate_.states.back().t_ns) + " ns lies outside the recording");
+}
+
+TEST_F(Evaluate, WhatDidNotConvergeIsNotMeasured) {
+  estimate_.status = core::SolveStatus::kIterationLimit;
+  estimate_.reason = "50 iterations";
+  const TrialResult result = evaluate();
+  EXPECT_FALSE(result.ok);
+  EXPECT_EQ(result.status, "iteration_limit");
+  EXPECT_EQ(result.reason, "50 iterations");
+  EXPECT_TRUE(result.metrics.empty());
+  EXPECT_EQ(result.solver.iterations, 9);
+  EXPECT_DOUBLE_EQ(result.solver.cost_per_dof, 1.0);
+}
+
+TEST_F(Evaluate, SeriesHoldsTheTrialOnAGrid) {
+  for (const auto& stamped : estimate_.states) {
+    estimate_.td_history.push_back({stamped.t_ns, truth_.calibration.td_s + 1e-3, 2e-3});
+  }
+  const TrialResult result = evaluate(Alignment::kNone);
+  const Series& series = result.series;
+  ASSERT_EQ(series.points.size(), static_cast<std::size_t>(kSeriesPoints));
+  EXPECT_EQ(series.points.front().t_s, 0.0);
+  EXPECT_DOUBLE_EQ(series.points.back().t_s, core::to_seconds((kStates - 1) * kStatesEvery * kImuStep));
+  const PoseError& last = series.points.back().error;
+  EXPECT_LT((last.position_m - error_.segment<3>(8)).norm(), 1e-12);
+  EXPECT_LT((last.rotation_rad - error_.segment<3>(11)).norm(), 1e-12);
+  EXPECT_LT((series.points.back().aligned.p - series.points.back().truth.p - last.position_m).norm(), 1e-15);
+  ASSERT_EQ(series.td.size(), static_cast<std::size_t>(kSeriesPoints));
+  EXPECT_NEAR(series.td.back().td_error_s, 1e-3, 1e-15);
+
+  const nlohmann::ordered_json json = to_json(series);
+  EXPECT_EQ(json.at("t_s").size(), series.points.size());
+  EXPECT_EQ(json.at("position_error_m").size(), 3U);
+  EXPECT_EQ(json.at("estimate").size(), 7U);
+  EXPECT_EQ(json.at("truth").at(6).at(10), series.points[10].truth.q.w());
+  EXPECT_EQ(json.at("td").at("sigma_s").at(0), 2e-3);
+}
+
+TEST(Series, AGridOfFewStampsTakesEachOnce) {
+  EXPECT_EQ(grid_indices({}), std::vector<int>());
+  EXPECT_EQ(grid_indices({5}), std::vector<int>({0}));
+  EXPECT_EQ(grid_indices({0, 10, 20, 30}), std::vector<int>({0, 1, 2, 3}));
+  EXPECT_EQ(grid_indices({0, 1, 3, 98, 99, 100}, 3), std::vector<int>({0, 2, 5}));
+}
+
+}  // namespace
+}  // namespace plumbline::eval

@@ -1,0 +1,75 @@
+// The subcommands of `plumbline`. Each returns the exit code:
+//   0 ok; 1 the answer is "worse", or trials failed beyond the allowed share; 2 bad input; 3 internal.
+// Bad input is thrown as core::InputError before anything is written; main() turns it into code 2.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "eval/alignment.h"
+
+namespace plumbline::tools {
+
+inline constexpr int kExitOk = 0;
+inline constexpr int kExitWorse = 1;
+inline constexpr int kExitBadInput = 2;
+inline constexpr int kExitInternal = 3;
+
+struct RunOptions {
+  std::filesystem::path experiment;
+  std::optional<std::filesystem::path> out;  // out/<experiment.name>
+  std::optional<int> trials;
+  int jobs = 0;  // 0: one a processor
+  std::vector<std::string> set;
+  bool fresh = false;  // discard results of another configuration
+  bool json = false;
+};
+int run(const RunOptions& options);
+
+struct SimulateOptions {
+  std::filesystem::path scenario;
+  std::filesystem::path out;
+  std::uint64_t seed = 1;
+  std::uint64_t trial = 0;
+  std::vector<std::string> set;
+};
+int simulate(const SimulateOptions& options);
+
+struct EstimateOptions {
+  std::filesystem::path dataset;
+  std::optional<std::filesystem::path> estimator;  // the defaults where absent
+  std::filesystem::path out;
+  std::vector<std::string> set;
+};
+int estimate(const EstimateOptions& options);
+
+struct EvaluateOptions {
+  std::filesystem::path estimate;  // a TUM file, or a folder with estimate.tum
+  std::filesystem::path truth;     // a TUM file, or a dataset with its truth
+  eval::Alignment alignment = eval::Alignment::kPosyaw;
+  int first_n = 0;
+  bool json = false;
+};
+int evaluate(const EvaluateOptions& options);
+
+struct ReplayOptions {
+  std::filesystem::path results;  // the folder of a run
+  std::string run_id;
+  std::optional<std::filesystem::path> out;  // writes the dataset, the estimate and the series
+};
+int replay(const ReplayOptions& options);
+
+struct CheckOptions {
+  std::vector<std::filesystem::path> files;
+  std::vector<std::string> set;
+  bool keys = false;  // print the table of all keys
+};
+int check(const CheckOptions& options);
+
+// The table of all keys as Markdown, which stands in configs/README.md.
+std::string key_table();
+
+}  // namespace plumbline::tools

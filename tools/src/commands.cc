@@ -1,0 +1,225 @@
+#include "tools/commands.h"
+
+#include <optional>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "core/atomic_file.h"
+#include "core/dataset.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/pose_file.h"
+#include "estimator/estimate.h"
+#include "eval/result_store.h"
+#include "eval/series.h"
+#include "eval/trajectory_error.h"
+#include "sim/simulate.h"
+#include "sim/trajectory.h"
+#include "sim/truth_files.h"
+#include "tools/experiment.h"
+#include "tools/run_trial.h"
+#include "tools/version.h"
+
+namespace plumbline::tools {
+namespace {
+
+using nlohmann::ordered_json;
+
+// A recording with its truth beside it.
+void write_simulation(const std::filesystem::path& folder, const sim::Simulation& simulation,
+                      const core::DatasetMeta& meta) {
+  core::write_dataset(folder, simulation.measurements, meta);
+  sim::write_truth(folder, simulation.truth);
+}
+
+// estimate.tum and meta.yaml, as an external program would write them.
+void write_estimate(const std::filesystem::path& folder, const core::EstimateLog& estimate) {
+  std::filesystem::create_directories(folder);
+  std::vector<core::StampedPose> poses;
+  for (const core::StampedState& s : estimate.states) poses.push_back({s.t_ns, s.state.T_W_B});
+  core::write_tum(folder / "estimate.tum", poses);
+  const auto sigma = [&](int i) { return std::sqrt(estimate.covariance(i, i)); };
+  ordered_json covariance = ordered_json::array();
+  for (int r = 0; r < core::kCovDim; ++r) {
+    for (int c = 0; c < core::kCovDim; ++c) covariance.push_back(estimate.covariance(r, c));
+  }
+  ordered_json meta = {{"schema", "plumbline-estimate/1"},
+                       {"version", version()},
+                       {"status", core::kSolveStatusNames[static_cast<std::size_t>(estimate.status)]},
+                       {"reason", estimate.reason},
+                       {"stamp_clock", "imu"},
+                       {"td_reference_row", "middle"},
+                       {"calibration", core::resolved_config(estimate.calibration)},
+                       {"td_sigma_s", sigma(core::kCovTd)},
+                       {"readout_sigma_s", sigma(core::kCovReadout)},
+                       {"iterations", estimate.summary.iterations},
+                       {"final_cost", estimate.summary.final_cost},
+                       {"cost_per_dof", estimate.summary.cost_per_dof()},
+                       {"covariance_order", "p_B_C, theta_B_C, td, readout, last state (p, theta, v, b_g, b_a)"},
+                       {"covariance", covariance}};
+  core::write_file_atomically(folder / "meta.yaml", core::to_yaml(meta));
+}
+
+void refuse_existing(const std::filesystem::path& folder) {
+  const bool empty = std::filesystem::is_directory(folder) && std::filesystem::is_empty(folder);
+  if (std::filesystem::exists(folder) && !empty) {
+    throw core::DataError(fmt::format("{}: exists and is not an empty folder", folder.generic_string()));
+  }
+}
+
+}  // namespace
+
+int simulate(const SimulateOptions& options) {
+  refuse_existing(options.out);
+  const sim::ScenarioConfig scenario = load_scenario(options.scenario, options.set);
+  const core::TrialId id{options.seed, options.trial};
+  const sim::Simulation simulation = sim::simulate(scenario, id);
+  const std::string hash =
+      core::content_hash(core::resolved_config(scenario, core::PathForm::kContentHash).dump());
+  write_simulation(options.out, simulation, {.config_hash = hash, .seed = id.seed, .trial = id.trial});
+
+  const auto trajectory = sim::make_trajectory(scenario.trajectory, scenario.duration_s, id);
+  const sim::MotionStrength m = sim::motion_strength(*trajectory, scenario.duration_s);
+  std::size_t observations = 0;
+  for (const core::Frame& frame : simulation.measurements.frames) observations += frame.points.size();
+  const std::size_t frames = simulation.measurements.frames.size();
+  fmt::print(
+      "path {:.2f} m, rms: speed {:.3f} m/s, acceleration {:.3f} m/s^2, rate {:.3f} rad/s (peak {:.3f}), "
+      "angular acceleration {:.3f} rad/s^2\n",
+      m.path_m, m.speed_rms_m_s, m.acceleration_rms_m_s2, m.rate_rms_rad_s, m.rate_peak_rad_s,
+      m.angular_acceleration_rms_rad_s2);
+  if (const auto fit = sim::fit_residuals(scenario.trajectory, scenario.duration_s)) {
+    fmt::print("spline fit residual, rms: {:.3g} m, {:.3g} rad\n", fit->position_rms_m, fit->rotation_rms_rad);
+  }
+  fmt::print("{} IMU samples, {} frames, {} points, {:.1f} a frame, {} tracks\ndataset: {}\n",
+             simulation.measurements.imu.size(), frames, observations,
+             frames > 0 ? static_cast<double>(observations) / static_cast<double>(frames) : 0.0,
+             simulation.truth.track_landmark.size(), options.out.generic_string());
+  return kExitOk;
+}
+
+int estimate(const EstimateOptions& options) {
+  refuse_existing(options.out);
+  const estimator::EstimatorConfig config = load_estimator(options.estimator, options.set);
+  const core::MeasurementLog log = core::read_dataset(options.dataset);
+  const core::EstimateLog estimate = estimator::estimate(log, config);
+  write_estimate(options.out, estimate);
+  fmt::print("{}{}{}, {} iterations, cost per degree of freedom {:.4f}\n",
+             core::kSolveStatusNames[static_cast<std::size_t>(estimate.status)], estimate.reason.empty() ? "" : ": ",
+             estimate.reason, estimate.summary.iterations, estimate.summary.cost_per_dof());
+  fmt::print("td {:.6f} ms (sigma {:.6f}), readout {:.6f} ms (sigma {:.6f}), middle row\nestimate: {}\n",
+             1e3 * estimate.calibration.td_s, 1e3 * std::sqrt(estimate.covariance(core::kCovTd, core::kCovTd)),
+             1e3 * estimate.calibration.readout_s,
+             1e3 * std::sqrt(estimate.covariance(core::kCovReadout, core::kCovReadout)), options.out.generic_string());
+  return estimate.status == core::SolveStatus::kConverged ? kExitOk : kExitWorse;
+}
+
+int evaluate(const EvaluateOptions& options) {
+  const bool folder = std::filesystem::is_directory(options.estimate);
+  const auto estimate =
+      core::read_tum(folder ? options.estimate / "estimate.tum" : options.estimate, {.allow_unusable = true});
+  std::vector<core::StampedPose> truth;
+  if (std::filesystem::is_directory(options.truth)) {
+    for (const core::StampedState& s : sim::read_truth(options.truth).states) truth.push_back({s.t_ns, s.state.T_W_B});
+  } else {
+    truth = core::read_tum(options.truth);
+  }
+  const eval::TrajectoryErrors errors =
+      eval::trajectory_errors(estimate, truth, {.alignment = options.alignment, .first_n = options.first_n});
+  if (options.json) {
+    fmt::print("{}\n", eval::to_json(errors, options.alignment).dump(2));
+  } else if (!errors.ok) {
+    fmt::print("failed run: {}\n", errors.reason);
+  } else {
+    fmt::print("alignment {}, {} poses matched, coverage {:.1f} %\n\n{:<22}{:>12}{:>12}{:>12}{:>12}{:>12}{:>12}\n",
+               eval::kAlignmentNames[static_cast<std::size_t>(options.alignment)], errors.matched,
+               100.0 * errors.coverage, "", "rmse", "mean", "median", "std", "min", "max");
+    const auto line = [](const char* name, const eval::ErrorStatistics& s) {
+      fmt::print("{:<22}{:>12.6f}{:>12.6f}{:>12.6f}{:>12.6f}{:>12.6f}{:>12.6f}\n", name, s.rmse, s.mean, s.median,
+                 s.std, s.min, s.max);
+    };
+    line("ATE position [m]", errors.position_m);
+    line("ATE rotation [deg]", errors.rotation_deg);
+  }
+  return errors.ok ? kExitOk : kExitWorse;
+}
+
+int replay(const ReplayOptions& options) {
+  if (options.out) refuse_existing(*options.out);
+  const Plan plan = read_manifest(options.results / "manifest.json");
+  const int trials = plan.base.experiment.trials;
+  for (const Cell& cell : plan.cells) {
+    for (int trial = 0; trial < trials; ++trial) {
+      if (run_id(cell, trial) != options.run_id) continue;
+      const core::TrialId id{plan.base.experiment.seed, static_cast<std::uint64_t>(trial)};
+      eval::Row row;
+      row.run_id = options.run_id;
+      row.cell = static_cast<int>(&cell - plan.cells.data());
+      row.trial = trial;
+      row.seed = id.seed;
+      eval::TrialResult result;
+      try {
+        result = run_trial(cell.experiment, id);
+      } catch (const core::InputError&) {
+        throw;
+      } catch (const std::exception& error) {
+        result.status = "exception";
+        result.reason = error.what();
+      }
+      row = eval::with_result(row, result);
+      if (options.out) {
+        const sim::Simulation simulation = sim::simulate(cell.experiment.scenario, id);
+        write_simulation(*options.out / "dataset", simulation,
+                         {.config_hash = cell.config_hash, .seed = id.seed, .trial = id.trial});
+        write_estimate(*options.out / "estimate",
+                       estimator::estimate(simulation.measurements, cell.experiment.estimator));
+        core::write_file_atomically(*options.out / "series.json", eval::to_json(result.series).dump() + "\n");
+      }
+      const std::string line = eval::to_line(row);
+      fmt::print("{}\n", line);
+
+      std::optional<std::string> stored;
+      const std::filesystem::path results = options.results / "results.jsonl";
+      if (std::filesystem::exists(results)) {
+        eval::for_each_row(results, eval::Tail::kWhole, [&](const eval::Row& r) {
+          if (r.run_id == options.run_id) stored = eval::to_line(r);
+        });
+      }
+      if (!stored) return kExitOk;
+      if (*stored == line) {
+        fmt::print(stderr, "identical to the stored row\n");
+        return kExitOk;
+      }
+      fmt::print(stderr, "differs from the stored row:\n{}\n", *stored);
+      return kExitWorse;
+    }
+  }
+  throw core::DataError(fmt::format("{}: no run with id '{}'", (options.results / "manifest.json").generic_string(),
+                                    options.run_id));
+}
+
+int check(const CheckOptions& options) {
+  if (options.keys) fmt::print("{}", key_table());
+  for (const std::filesystem::path& file : options.files) {
+    switch (config_kind(file)) {
+      case ConfigKind::kExperiment: {
+        const Plan plan = load_plan(file, options.set);
+        fmt::print("{}: experiment '{}', {} cells x {} trials\n", file.generic_string(), plan.base.experiment.name,
+                   plan.cells.size(), plan.base.experiment.trials);
+        break;
+      }
+      case ConfigKind::kScenario:
+        load_scenario(file, options.set);
+        fmt::print("{}: scenario\n", file.generic_string());
+        break;
+      case ConfigKind::kEstimator:
+        load_estimator(file, options.set);
+        fmt::print("{}: estimator\n", file.generic_string());
+        break;
+    }
+  }
+  return kExitOk;
+}
+
+}  // namespace plumbline::tools

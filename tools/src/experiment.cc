@@ -1,0 +1,307 @@
+#include "tools/experiment.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "estimator/estimate.h"
+#include "sim/trajectory.h"
+
+namespace plumbline::eval {
+
+void visit(core::ConfigVisitor& v, MetricsConfig& c) {
+  v.choice("alignment", c.alignment, kAlignmentNames, "of the trajectory, for the ATE");
+  v.value("first_n", c.first_n, core::at_least(0), "poses that decide the alignment; 0: all");
+}
+
+}  // namespace plumbline::eval
+
+namespace plumbline::tools {
+
+void visit(core::ConfigVisitor& v, ExperimentConfig& c) {
+  v.value("name", c.name, "of the results' folder; the file's name where empty");
+  v.value("trials", c.trials, core::between(1, 10'000'000), "of each cell");
+  v.value("seed", c.seed, core::any(), "of all draws");
+  v.value("max_failed_share", c.max_failed_share, core::probability(), "more failed trials than this: exit code 1");
+}
+
+void visit(core::ConfigVisitor& v, Experiment& c) {
+  v.section("experiment", c.experiment, "trials and seed; `axes` (a map from full keys to lists) spans the cells");
+  v.section("scenario", c.scenario, "what is simulated");
+  v.section("estimator", c.estimator, "how it is estimated");
+  v.section("eval", c.metrics, "how it is scored");
+}
+
+namespace {
+
+using core::ConfigEntry;
+using core::ConfigTree;
+using nlohmann::ordered_json;
+
+struct Axis {
+  std::string key;
+  std::vector<ConfigTree> values;
+};
+
+ConfigTree* find_entry(ConfigTree& map, std::string_view key) {
+  const auto entry = std::find_if(map.entries.begin(), map.entries.end(), [&](const auto& e) { return e.key == key; });
+  return entry == map.entries.end() ? nullptr : &entry->value;
+}
+
+void require_map(const ConfigTree& tree, std::string_view key) {
+  if (tree.kind != ConfigTree::Kind::kMap && tree.kind != ConfigTree::Kind::kNull) {
+    throw core::config_error(tree.origin, key, "must be a map of keys");
+  }
+}
+
+// Takes the entry out of the map; null where it has none.
+ConfigTree take_entry(ConfigTree& map, std::string_view key) {
+  ConfigTree* found = find_entry(map, key);
+  if (found == nullptr) return {};
+  ConfigTree taken = std::move(*found);
+  std::erase_if(map.entries, [&](const ConfigEntry& e) { return e.key == key; });
+  return taken;
+}
+
+// `scenario: FILE` becomes what is in the file.
+void include_files(ConfigTree& root) {
+  for (const std::string_view key : {"scenario", "estimator"}) {
+    ConfigTree* section = find_entry(root, key);
+    if (section == nullptr || section->kind != ConfigTree::Kind::kScalar) continue;
+    std::filesystem::path file = section->scalar;
+    const bool from_command_line = section->origin.line == 0;
+    if (!from_command_line) file = std::filesystem::path(*section->origin.label).parent_path() / file;
+    if (!std::filesystem::is_regular_file(file)) {
+      throw core::config_error(section->origin, key, fmt::format("no such file: {}", file.generic_string()));
+    }
+    *section = core::load_config_file(file);
+    require_map(*section, key);
+  }
+}
+
+std::vector<Axis> take_axes(ConfigTree& root) {
+  std::vector<Axis> axes;
+  ConfigTree* experiment = find_entry(root, "experiment");
+  if (experiment == nullptr || experiment->kind != ConfigTree::Kind::kMap) return axes;
+  const ConfigTree map = take_entry(*experiment, "axes");
+  require_map(map, "experiment.axes");
+  for (const ConfigEntry& entry : map.entries) {
+    const std::string key = "experiment.axes." + entry.key;
+    if (!(entry.key.starts_with("scenario.") || entry.key.starts_with("estimator."))) {
+      throw core::config_error(entry.origin, key, "an axis is a full key such as scenario.camera.td_s");
+    }
+    if (entry.value.kind != ConfigTree::Kind::kSequence || entry.value.items.empty()) {
+      throw core::config_error(entry.origin, key, "must be a list of at least one value");
+    }
+    axes.push_back({entry.key, entry.value.items});
+  }
+  return axes;
+}
+
+// Of the root of an experiment; unknown keys of it and below are errors.
+Experiment read_experiment(const ConfigTree& root) {
+  Experiment experiment;
+  core::read_config(root, "", experiment);
+  if (const auto violation = sim::validate(experiment.scenario)) {
+    const std::string key = "scenario." + violation->key;
+    const ConfigTree* value = core::find_value(root, key);
+    if (value != nullptr) throw core::config_error(value->origin, key, violation->rule);
+    throw core::config_error(root.origin, key, violation->rule);
+  }
+  return experiment;
+}
+
+std::string hash_of(const Experiment& experiment) {
+  const ordered_json content = {
+      {"seed", experiment.experiment.seed},
+      {"scenario", core::resolved_config(experiment.scenario, core::PathForm::kContentHash)},
+      {"estimator", core::resolved_config(experiment.estimator, core::PathForm::kContentHash)},
+      {"eval", core::resolved_config(experiment.metrics, core::PathForm::kContentHash)}};
+  return core::content_hash(content.dump());
+}
+
+// The value as it stands in the file: a number where it is one.
+ordered_json axis_value(const ConfigTree& tree) {
+  if (tree.kind == ConfigTree::Kind::kSequence) {
+    ordered_json list = ordered_json::array();
+    for (const ConfigTree& item : tree.items) list.push_back(axis_value(item));
+    return list;
+  }
+  if (tree.quoted) return tree.scalar;
+  const ordered_json parsed = ordered_json::parse(tree.scalar, nullptr, false);
+  return parsed.is_discarded() ? ordered_json(tree.scalar) : parsed;
+}
+
+void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_t depth, const ordered_json& values,
+               std::vector<Cell>& cells) {
+  if (depth == axes.size()) {
+    Cell cell{.axes = values, .experiment = read_experiment(root), .config_hash = {}};
+    cell.config_hash = hash_of(cell.experiment);
+    cells.push_back(std::move(cell));
+    return;
+  }
+  for (const ConfigTree& value : axes[depth].values) {
+    ConfigTree with_value = root;
+    core::set_value(with_value, axes[depth].key, value);
+    ordered_json with_axis = values;
+    with_axis[axes[depth].key] = axis_value(value);
+    add_cells(with_value, axes, depth + 1, with_axis, cells);
+  }
+}
+
+// What only shows when a cell's parts meet: noise the estimator cannot work with, pose files that are too short.
+void check_cell(const Experiment& e) {
+  estimator::require_usable(
+      estimator::believed_noise(e.estimator, e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px),
+      e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
+  sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, {e.experiment.seed, 0});
+}
+
+Plan make_plan(ConfigTree root, const std::vector<Axis>& axes, const std::string& default_name) {
+  Plan plan;
+  plan.base = read_experiment(root);
+  std::string& name = plan.base.experiment.name;
+  if (name.empty()) name = default_name;
+  if (name.find('/') != std::string::npos || name == "." || name == "..") {
+    throw core::ConfigError(fmt::format("experiment.name: must be a plain name, got '{}'", name));
+  }
+  add_cells(root, axes, 0, ordered_json::object(), plan.cells);
+  std::string hashes;
+  for (const Cell& cell : plan.cells) hashes += cell.config_hash;
+  plan.config_hash = core::content_hash(hashes);
+  return plan;
+}
+
+ConfigTree apply_overrides(ConfigTree root, const std::vector<std::string>& overrides, std::vector<Axis>* axes) {
+  std::vector<core::ConfigOverride> parsed;
+  for (const std::string& text : overrides) parsed.push_back(core::parse_override(text));
+  // Files first, so that keys can be set on top of them wherever the file's name was given.
+  for (core::ConfigOverride& o : parsed) {
+    if (o.key == "scenario" || o.key == "estimator") core::set_value(root, o.key, o.value);
+  }
+  include_files(root);
+  if (axes != nullptr) *axes = take_axes(root);
+  const ConfigTree settings = take_entry(root, "set");
+  require_map(settings, "set");
+  for (const ConfigEntry& entry : settings.entries) core::set_value(root, entry.key, entry.value);
+  for (const core::ConfigOverride& o : parsed) {
+    if (o.key == "scenario" || o.key == "estimator") continue;
+    core::set_value(root, o.key, o.value);
+    if (axes != nullptr) std::erase_if(*axes, [&](const Axis& axis) { return axis.key == o.key; });
+  }
+  return root;
+}
+
+// A tree {KEY: what is in the file}.
+ConfigTree wrap(const std::filesystem::path& file, const std::string& key) {
+  ConfigTree root;
+  root.kind = ConfigTree::Kind::kMap;
+  ConfigTree content = core::load_config_file(file);
+  require_map(content, key);
+  root.origin = content.origin;
+  root.entries.push_back({key, content.origin, std::move(content)});
+  return root;
+}
+
+}  // namespace
+
+std::string run_id(const Cell& cell, int trial) {
+  return core::content_hash(fmt::format("{}/{}", cell.config_hash, trial));
+}
+
+Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  ConfigTree root = core::load_config_file(file);
+  require_map(root, "");
+  std::vector<Axis> axes;
+  root = apply_overrides(std::move(root), overrides, &axes);
+  Plan plan = make_plan(std::move(root), axes, file.stem().string());
+  for (const Cell& cell : plan.cells) check_cell(cell.experiment);
+  return plan;
+}
+
+sim::ScenarioConfig load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  const Experiment experiment = read_experiment(apply_overrides(wrap(file, "scenario"), overrides, nullptr));
+  sim::make_trajectory(experiment.scenario.trajectory, experiment.scenario.duration_s, {});
+  return experiment.scenario;
+}
+
+estimator::EstimatorConfig load_estimator(const std::optional<std::filesystem::path>& file,
+                                          const std::vector<std::string>& overrides) {
+  ConfigTree root;
+  root.kind = ConfigTree::Kind::kMap;
+  if (file) root = wrap(*file, "estimator");
+  return read_experiment(apply_overrides(std::move(root), overrides, nullptr)).estimator;
+}
+
+ordered_json to_manifest(const Plan& plan) {
+  ordered_json cells = ordered_json::array();
+  for (const Cell& cell : plan.cells) {
+    ordered_json config = core::resolved_config(cell.experiment);
+    config.erase("experiment");
+    cells.push_back({{"axes", cell.axes}, {"config_hash", cell.config_hash}, {"config", config}});
+  }
+  return {{"schema", "plumbline-manifest/1"},
+          {"experiment", core::resolved_config(plan.base.experiment)},
+          {"config_hash", plan.config_hash},
+          {"runs", plan.runs()},
+          {"run_id", "XXH3-64 of 'CONFIG_HASH/TRIAL' of the cell"},
+          {"cells", cells}};
+}
+
+Plan read_manifest(const std::filesystem::path& file) {
+  // A manifest is JSON, which the strict reader takes as YAML.
+  ConfigTree manifest = core::load_config_file(file);
+  require_map(manifest, "");
+  const ConfigTree schema = take_entry(manifest, "schema");
+  if (schema.scalar != "plumbline-manifest/1") {
+    throw core::config_error(manifest.origin, "schema", "must be plumbline-manifest/1");
+  }
+  const ConfigTree experiment = take_entry(manifest, "experiment");
+  const ConfigTree cells = take_entry(manifest, "cells");
+  if (cells.kind != ConfigTree::Kind::kSequence || cells.items.empty()) {
+    throw core::config_error(manifest.origin, "cells", "must be a list of at least one cell");
+  }
+  Plan plan;
+  for (ConfigTree item : cells.items) {
+    require_map(item, "cells");
+    ConfigTree root = take_entry(item, "config");
+    require_map(root, "cells.config");
+    root.entries.push_back({"experiment", experiment.origin, experiment});
+    Cell cell{.axes = ordered_json::object(), .experiment = read_experiment(root), .config_hash = {}};
+    const ConfigTree axes = take_entry(item, "axes");
+    for (const ConfigEntry& axis : axes.entries) cell.axes[axis.key] = axis_value(axis.value);
+    cell.config_hash = hash_of(cell.experiment);
+    if (cell.config_hash != take_entry(item, "config_hash").scalar) {
+      throw core::config_error(item.origin, "cells.config_hash",
+                               "does not match the cell's configuration and the files it names");
+    }
+    plan.cells.push_back(std::move(cell));
+  }
+  plan.base = plan.cells.front().experiment;
+  plan.config_hash = take_entry(manifest, "config_hash").scalar;
+  return plan;
+}
+
+ConfigKind config_kind(const std::filesystem::path& file) {
+  const ConfigTree root = core::load_config_file(file);
+  require_map(root, "");
+  const auto has_any = [&](std::span<const std::string_view> keys) {
+    return std::any_of(root.entries.begin(), root.entries.end(),
+                       [&](const ConfigEntry& e) { return std::find(keys.begin(), keys.end(), e.key) != keys.end(); });
+  };
+  constexpr std::array<std::string_view, 5> kExperimentKeys = {"experiment", "scenario", "estimator", "eval", "set"};
+  constexpr std::array<std::string_view, 8> kScenarioKeys = {"duration_s", "gravity_m_s2", "trajectory", "camera",
+                                                             "world",      "points",       "prior",      "imu"};
+  constexpr std::array<std::string_view, 7> kEstimatorKeys = {"type",     "timing", "residual",        "landmark",
+                                                              "estimate", "solver", "keyframe_rate_hz"};
+  if (has_any(kExperimentKeys)) return ConfigKind::kExperiment;
+  if (has_any(kEstimatorKeys)) return ConfigKind::kEstimator;
+  if (has_any(kScenarioKeys)) return ConfigKind::kScenario;
+  throw core::config_error(root.origin, "", "is neither an experiment nor a scenario nor an estimator");
+}
+
+}  // namespace plumbline::tools

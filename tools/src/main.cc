@@ -1,0 +1,113 @@
+// plumbline: see docs/ and `plumbline --help`.
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <glog/logging.h>
+
+#include "core/error.h"
+#include "tools/commands.h"
+#include "tools/version.h"
+
+// Of OpenBLAS, where it is the BLAS in use: one thread a trial, and the same bytes whatever the number of processors.
+extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+
+namespace {
+
+using namespace plumbline::tools;
+
+template <class T>
+std::map<std::string, T> words(const auto& names) {
+  std::map<std::string, T> result;
+  for (std::size_t i = 0; i < names.size(); ++i) result.emplace(names[i], static_cast<T>(i));
+  return result;
+}
+
+int parse_and_run(int argc, char** argv) {
+  CLI::App app{"Simulation and evaluation of visual-inertial estimators with a time offset and rolling shutter"};
+  app.set_version_flag("--version", fmt::format("plumbline {} ({})", version(), commit()));
+  app.require_subcommand(1);
+  const auto add_set = [](CLI::App* command, std::vector<std::string>& set) {
+    command->add_option("--set", set, "override a key, as in scenario.camera.td_s=0.02")->type_name("KEY=VALUE")->allow_extra_args(false);
+  };
+
+  RunOptions run_options;
+  CLI::App* run_command = app.add_subcommand("run", "simulate, estimate and evaluate an experiment");
+  run_command->add_option("EXPERIMENT", run_options.experiment, "experiment file (YAML)")->required();
+  run_command->add_option("--out", run_options.out, "folder of the results; default out/NAME");
+  run_command->add_option("--trials", run_options.trials, "trials of each cell");
+  run_command->add_option("--jobs", run_options.jobs, "threads; default one a processor")->check(CLI::PositiveNumber);
+  run_command->add_flag("--fresh", run_options.fresh, "discard results of another configuration");
+  run_command->add_flag("--json", run_options.json, "print the summary as JSON");
+  add_set(run_command, run_options.set);
+
+  SimulateOptions simulate_options;
+  CLI::App* simulate_command = app.add_subcommand("simulate", "write one recording and its truth as a dataset");
+  simulate_command->add_option("SCENARIO", simulate_options.scenario, "scenario file (YAML)")->required();
+  simulate_command->add_option("--out", simulate_options.out, "folder of the dataset")->required();
+  simulate_command->add_option("--seed", simulate_options.seed, "seed of all draws");
+  simulate_command->add_option("--trial", simulate_options.trial, "which draw of noise and priors");
+  add_set(simulate_command, simulate_options.set);
+
+  EstimateOptions estimate_options;
+  CLI::App* estimate_command = app.add_subcommand("estimate", "estimate a dataset");
+  estimate_command->add_option("DATASET", estimate_options.dataset, "folder of the dataset")->required();
+  estimate_command->add_option("--estimator", estimate_options.estimator, "estimator file (YAML)");
+  estimate_command->add_option("--out", estimate_options.out, "folder of the estimate")->required();
+  add_set(estimate_command, estimate_options.set);
+
+  EvaluateOptions evaluate_options;
+  CLI::App* evaluate_command = app.add_subcommand("evaluate", "compare an estimated trajectory with the true one");
+  evaluate_command->add_option("ESTIMATE", evaluate_options.estimate, "TUM file, or folder of an estimate")->required();
+  evaluate_command->add_option("--truth", evaluate_options.truth, "TUM file, or folder of a dataset")->required();
+  evaluate_command->add_option("--align", evaluate_options.alignment, "none, posyaw, se3 or sim3")
+      ->transform(CLI::CheckedTransformer(words<plumbline::eval::Alignment>(plumbline::eval::kAlignmentNames)));
+  evaluate_command->add_option("--first", evaluate_options.first_n, "align by the first N poses only")
+      ->check(CLI::NonNegativeNumber);
+  evaluate_command->add_flag("--json", evaluate_options.json, "print JSON");
+
+  ReplayOptions replay_options;
+  CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a finished experiment again");
+  replay_command->add_option("OUT_DIR", replay_options.results, "folder of the results")->required();
+  replay_command->add_option("RUN_ID", replay_options.run_id, "as in results.jsonl")->required();
+  replay_command->add_option("--out", replay_options.out, "write dataset, estimate and series there");
+
+  CheckOptions check_options;
+  CLI::App* check_command = app.add_subcommand("check", "check configuration files");
+  check_command->add_option("CONFIG", check_options.files, "experiments, scenarios or estimators");
+  check_command->add_flag("--keys", check_options.keys, "print all keys with defaults and rules");
+  add_set(check_command, check_options.set);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitOk : kExitBadInput;
+  }
+  if (*run_command) return run(run_options);
+  if (*simulate_command) return simulate(simulate_options);
+  if (*estimate_command) return estimate(estimate_options);
+  if (*evaluate_command) return evaluate(evaluate_options);
+  if (*replay_command) return replay(replay_options);
+  return check(check_options);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
+  // Ceres warns of every step that it rejects; what matters comes back as a status.
+  FLAGS_minloglevel = google::GLOG_FATAL;
+  google::InitGoogleLogging(argv[0]);
+  try {
+    return parse_and_run(argc, argv);
+  } catch (const plumbline::core::InputError& error) {
+    fmt::print(stderr, "plumbline: {}\n", error.what());
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "plumbline: internal error: {}\n", error.what());
+    return kExitInternal;
+  }
+}
