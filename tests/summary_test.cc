@@ -42,18 +42,20 @@ TEST(Summary, FiguresByHand) {
   EXPECT_NEAR(td.mean, 1e-5, 1e-18);
   EXPECT_NEAR(td.rmse, std::sqrt(3.5) * 1e-5, 1e-18);
   EXPECT_NEAR(td.median, 1e-5, 1e-18);
-  EXPECT_NEAR(td.std.value(), std::sqrt(10.0 / 3.0) * 1e-5, 1e-18);
-  EXPECT_NEAR(td.nees->mean, 0.7, 1e-15);
-  EXPECT_EQ(td.nees->dof, 1);
-  EXPECT_NEAR(td.nees->band95.hi, 11.1433 / 4.0, 1e-4);               // chi-square of 4
-  EXPECT_NEAR(cell.metrics[2].nees->band95.hi, 39.3641 / 4.0, 1e-4);  // of 24
+  EXPECT_NEAR(td.std.value_or(-1.0), std::sqrt(10.0 / 3.0) * 1e-5, 1e-18);
+  const NeesSummary nees = td.nees.value_or(NeesSummary{});
+  EXPECT_NEAR(nees.mean, 0.7, 1e-15);
+  EXPECT_EQ(nees.dof, 1);
+  EXPECT_NEAR(nees.band95.hi, 11.1433 / 4.0, 1e-4);                                          // chi-square of 4
+  EXPECT_NEAR(cell.metrics[2].nees.value_or(NeesSummary{}).band95.hi, 39.3641 / 4.0, 1e-4);  // of 24
 }
 
 TEST(Summary, SignedErrorsHaveExactIntervalsOthersDoNot) {
   const CellSummary cell = summarise(kRows, {});
   const Interval exact = rmse_interval(cell.metrics[1].rmse, 4, 0.95);
-  EXPECT_EQ(cell.metrics[1].rmse_ci95->hi, exact.hi);
-  EXPECT_EQ(cell.metrics[0].rmse_ci95->hi, rms_interval({0.01, 0.02, 0.03, 0.02}, 0.95)->hi);
+  EXPECT_EQ(cell.metrics[1].rmse_ci95.value_or(Interval{}).hi, exact.hi);
+  EXPECT_EQ(cell.metrics[0].rmse_ci95.value_or(Interval{}).hi,
+            rms_interval({0.01, 0.02, 0.03, 0.02}, 0.95).value_or(Interval{-1.0, -1.0}).hi);
 }
 
 TEST(Summary, AFailedTrialCountsAndTakesNeesAway) {
@@ -110,7 +112,7 @@ TEST(SummaryTable, ReadsAsMeant) {
   std::vector<Row> partly = kRows;
   partly.push_back(failed());
   std::vector<Row> wrong = kRows;
-  for (Row& r : wrong) *r.metrics[1].nees *= 100.0;
+  for (Row& r : wrong) r.metrics[1].nees = 70.0;
   const std::string table = summary_table(
       {summarise(kRows, {{"scenario.camera.td_s", 0.005}, {"estimator.timing", "propagated"}}),
        summarise(partly, {{"scenario.camera.td_s", 0.01}}), summarise({failed()}, {}), summarise(wrong, {})});

@@ -7,8 +7,10 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "core/lie.h"
@@ -26,6 +28,7 @@ constexpr core::TimeNs kMs = 1'000'000;
 // n poses `interval` apart on a curve without symmetry, a function of time alone.
 Poses path(int n, core::TimeNs interval = 50 * kMs, core::TimeNs start = 0) {
   Poses poses;
+  poses.reserve(n);
   for (int k = 0; k < n; ++k) {
     const core::TimeNs t_ns = start + k * interval;
     const double u = core::to_seconds(t_ns);
@@ -38,6 +41,7 @@ Poses path(int n, core::TimeNs interval = 50 * kMs, core::TimeNs start = 0) {
 
 std::vector<PosePair> pairs_of(const Poses& estimate, const Poses& truth) {
   std::vector<PosePair> pairs;
+  pairs.reserve(truth.size());
   for (std::size_t k = 0; k < truth.size(); ++k) pairs.push_back({truth[k].t_ns, estimate[k].T_W_B, truth[k].T_W_B});
   return pairs;
 }
@@ -232,8 +236,9 @@ TEST(TrajectoryError, AgreesWithEvoAndRpg) {
       ASSERT_TRUE(e.ok) << e.reason;
       EXPECT_EQ(e.matched, 300);
       EXPECT_EQ(e.coverage, 1.0);
-      expect_statistics(e.position_m, expected.at("ate_position_m/" + name), pair + " position " + name);
-      expect_statistics(e.rotation_deg, expected.at("ate_rotation_deg/" + name), pair + " rotation " + name);
+      expect_statistics(e.position_m, expected.at("ate_position_m/" + name), fmt::format("{} position {}", pair, name));
+      expect_statistics(e.rotation_deg, expected.at("ate_rotation_deg/" + name),
+                        fmt::format("{} rotation {}", pair, name));
     }
     for (const Alignment alignment : {Alignment::kPosyaw, Alignment::kSe3, Alignment::kSim3}) {
       const std::string name = "rpg/" + std::string(kAlignmentNames[static_cast<std::size_t>(alignment)]);
@@ -241,13 +246,13 @@ TEST(TrajectoryError, AgreesWithEvoAndRpg) {
       const TrajectoryErrors e = trajectory_errors(estimate, truth, {.alignment = alignment});
       ASSERT_TRUE(e.ok) << e.reason;
       const Similarity& S = e.truth_from_estimate;
-      expect_near(e.position_m.rmse, rpg.at("ate_pos_rmse"), pair + " " + name + " position");
-      expect_near(e.rotation_deg.rmse, rpg.at("ate_rot_deg_rmse"), pair + " " + name + " rotation");
-      expect_near(S.s, rpg.at("scale"), pair + " " + name + " scale");
+      expect_near(e.position_m.rmse, rpg.at("ate_pos_rmse"), fmt::format("{} {} position", pair, name));
+      expect_near(e.rotation_deg.rmse, rpg.at("ate_rot_deg_rmse"), fmt::format("{} {} rotation", pair, name));
+      expect_near(S.s, rpg.at("scale"), fmt::format("{} {} scale", pair, name));
       if (alignment == Alignment::kPosyaw) {
         expect_near(std::atan2(S.R(1, 0), S.R(0, 0)) * core::kDegreesPerRadian, rpg.at("yaw_deg"), pair + " yaw");
       }
-      for (int i = 0; i < 3; ++i) expect_near(S.t(i), rpg.at("t").at(i), pair + " " + name + " t");
+      for (int i = 0; i < 3; ++i) expect_near(S.t(i), rpg.at("t").at(i), fmt::format("{} {} t", pair, name));
     }
   }
 }

@@ -38,7 +38,8 @@ void sync(const fs::path& path, int flags) {
   ::close(fd);
   errno = error;
   // Some network file systems cannot sync a folder; the rename itself is still atomic there.
-  if (failed != 0 && !(errno == EINVAL && (flags & O_DIRECTORY) != 0)) fail(path, "sync");
+  const bool unsupported = errno == EINVAL && (flags & O_DIRECTORY) != 0;
+  if (failed != 0 && !unsupported) fail(path, "sync");
 }
 
 }  // namespace

@@ -84,7 +84,7 @@ bool false_minimum(const BatchInput& input, const core::SolveSummary& summary) {
   return summary.cost_per_dof() > input.config.max_cost_per_dof;
 }
 
-// Solves the first stages of the recording, each twice as long as the one before, loosely.
+// Solves the recording loosely in stages, each twice as long as the one before.
 void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
   const core::TimeNs first_ns = input.log.frames[input.keyframes.front()].t_cam_ns;
   const auto keyframes_until = [&](double end_s) {
@@ -97,10 +97,9 @@ void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
     const std::size_t count = keyframes_until(end_s);
     place_states(input, count, timing_td_s, values);
     triangulate_missing(input, values);
-    if (count == input.keyframes.size()) return;
 
     BatchProblem problem(input, values);
-    const BatchProblem::SolveOptions loose{.max_iterations = 20, .function_tolerance = 1e-3};
+    const BatchProblem::SolveOptions loose{.max_iterations = 20, .function_tolerance = 0.05};
     const BatchProblem::Outcome outcome = problem.solve(loose);
     values = problem.values();
     // Landmarks that were triangulated from poor poses may have caught the solver; the poses are better now.
@@ -108,6 +107,7 @@ void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
       std::fill(values.landmarks.begin(), values.landmarks.end(), std::nullopt);
     }
     if (std::abs(values.calibration.td_s - timing_td_s) > kRetimeS) timing_td_s = values.calibration.td_s;
+    if (count == input.keyframes.size()) return;
   }
 }
 
@@ -121,7 +121,11 @@ core::EstimateLog failed(std::string reason) {
 }  // namespace
 
 core::EstimateLog estimate_batch(const core::MeasurementLog& log, const EstimatorConfig& config) {
-  BatchInput input{.log = log, .config = config, .noise = believed_noise(config, log.imu_noise, log.pixel_sigma_px), .keyframes = {}, .tracks = {}};
+  BatchInput input{.log = log,
+                   .config = config,
+                   .noise = believed_noise(config, log.imu_noise, log.pixel_sigma_px),
+                   .keyframes = {},
+                   .tracks = {}};
   input.keyframes = select_keyframes(log.frames, config.keyframe_rate_hz);
   input.tracks = collect_tracks(log.frames, input.keyframes);
   if (input.keyframes.size() < 2) return failed("fewer than two keyframes");

@@ -75,7 +75,7 @@ AlignmentResult align(const std::vector<Eigen::Vector3d>& estimate, const std::v
     S.R = best_yaw(m.C);
   } else {
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m.C, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Eigen::Vector3d d = svd.singularValues();
+    const Eigen::Vector3d& d = svd.singularValues();
     if (d(0) <= kRestSpread2 || d(1) <= kLineRatio * d(0)) {
       result.reason = fmt::format("{} alignment is not determined: {}", kAlignmentNames[index],
                                   d(0) <= kRestSpread2 ? "the positions do not move" : "the positions lie on a line");

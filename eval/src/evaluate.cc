@@ -101,6 +101,7 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
            TrialResult& result) {
   const std::vector<core::State> states = true_states(estimate, truth);
   std::vector<PosePair> pairs;
+  pairs.reserve(states.size());
   for (std::size_t k = 0; k < states.size(); ++k) {
     pairs.push_back({estimate.states[k].t_ns, estimate.states[k].state.T_W_B, states[k].T_W_B});
   }

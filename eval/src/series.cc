@@ -54,6 +54,7 @@ Series make_series(const std::vector<PosePair>& pairs, const TrajectoryErrors& e
   const core::TimeNs start = pairs.front().t_ns;
   Series series;
   std::vector<core::TimeNs> stamps;
+  stamps.reserve(pairs.size());
   for (const PosePair& pair : pairs) stamps.push_back(pair.t_ns);
   for (const int k : grid_indices(stamps)) {
     series.points.push_back({.t_s = core::to_seconds(pairs[k].t_ns - start),

@@ -88,6 +88,7 @@ Interval rmse_interval(double rmse, int n, double confidence) {
 
 std::optional<Interval> rms_interval(const std::vector<double>& values, double confidence) {
   std::vector<double> squares;
+  squares.reserve(values.size());
   for (const double x : values) squares.push_back(x * x);
   const auto half = half_width(squares, confidence);
   if (!half) return std::nullopt;

@@ -58,8 +58,9 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
     std::vector<double> values;
     std::vector<double> nees;
     for (const Row* row : ok) {
-      values.push_back(row->metrics[i].value);
-      if (row->metrics[i].nees) nees.push_back(*row->metrics[i].nees);
+      const Metric& metric = row->metrics[i];
+      values.push_back(metric.value);
+      if (metric.nees) nees.push_back(*metric.nees);
     }
     cell.metrics.push_back(summarise_values(first.name, values));
     if (nees.empty()) continue;

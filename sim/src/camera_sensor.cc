@@ -25,7 +25,8 @@ FrameView::FrameView(const Trajectory& trajectory, const core::PinholeCamera& ca
   }
   // Twice the motion that the middle row's speed and rate predict, so that their change is covered.
   const double half_readout_s = 0.5 * std::abs(calibration.readout_s);
-  half_angle += 2.0 * omega_C_.norm() * half_readout_s;
+  turn_rad_ = 2.0 * omega_C_.norm() * half_readout_s;
+  half_angle += turn_rad_;
   reach_m_ = 2.0 * v_C_.norm() * half_readout_s;
   cos_half_angle_ = std::cos(std::min(half_angle, std::numbers::pi));
 }
@@ -36,7 +37,8 @@ core::Pose FrameView::camera_pose_at(double t_imu_s) const {
 
 bool FrameView::may_see(const Eigen::Vector3d& P_W, double nearest_m, double farthest_m) const {
   const Eigen::Vector3d P_C = T_C_W_middle_ * P_W;
-  if (P_C.z() < nearest_m - reach_m_ || P_C.z() > farthest_m + reach_m_) return false;
+  const double margin_m = reach_m_ + turn_rad_ * P_C.norm();
+  if (P_C.z() < nearest_m - margin_m || P_C.z() > farthest_m + margin_m) return false;
   return P_C.z() + reach_m_ > cos_half_angle_ * (P_C.norm() - reach_m_);
 }
 

@@ -79,7 +79,7 @@ static void visit(core::ConfigVisitor& v, PointsConfig& c) {
 }
 
 static void visit(core::ConfigVisitor& v, PriorConfig& c) {
-  v.choice("means", c.means, kPriorMeansNames, "`drawn`: truth plus noise of the sigmas below; `truth`: exact");
+  v.choice("means", c.means, kPriorMeansNames, "`drawn`: truth plus noise of the sigmas below; `truth`: exact, and no NEES is reported");
   v.choice("start", c.start, kPriorStartNames, "where the iteration starts: at the means, or at a draw of its own");
   v.value("td_mean_s", c.td_mean_s, core::between(-1.0, 1.0), "drawn",
           "td of the middle row; with a fixed value no NEES of td is reported");

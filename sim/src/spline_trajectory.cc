@@ -142,21 +142,21 @@ std::vector<Sample> samples_in_span(const std::vector<core::StampedPose>& poses,
   const std::string file = config.file.generic_string();
   const double length_s = core::to_seconds(poses.back().t_ns - poses.front().t_ns);
   std::vector<Sample> samples;
-  for (const core::StampedPose& pose : poses) {
-    const double t = core::to_seconds(pose.t_ns - poses.front().t_ns) - config.start_s;
-    if (t < begin_s || t > end_s) continue;
-    if (!samples.empty() && t - samples.back().t_s > config.largest_gap_s) {
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double t = core::to_seconds(poses[i].t_ns - poses.front().t_ns) - config.start_s;
+    // The gap before this pose counts if any of it lies in the span, even where neither of its poses does.
+    const double gap_s = i == 0 ? 0.0 : core::to_seconds(poses[i].t_ns - poses[i - 1].t_ns);
+    if (gap_s > config.largest_gap_s && t > begin_s && t - gap_s < end_s) {
       throw core::DataError(
           fmt::format("{}: gap of {:.3f} s between the poses at {:.3f} s and {:.3f} s after the first; "
                       "scenario.trajectory.largest_gap_s is {}",
-                      file, t - samples.back().t_s, samples.back().t_s + config.start_s, t + config.start_s,
-                      config.largest_gap_s));
+                      file, gap_s, t - gap_s + config.start_s, t + config.start_s, config.largest_gap_s));
     }
-    samples.push_back({t, pose.T_W_B});
+    if (t >= begin_s && t <= end_s) samples.push_back({t, poses[i].T_W_B});
   }
   if (samples.size() < 2) {
-    throw core::DataError(fmt::format("{}: no poses at scenario.trajectory.start_s = {}; the file spans {:.3f} s",
-                                      file, config.start_s, length_s));
+    throw core::DataError(fmt::format("{}: no poses at scenario.trajectory.start_s = {}; the file spans {:.3f} s", file,
+                                      config.start_s, length_s));
   }
   return samples;
 }

@@ -27,6 +27,18 @@ class ThreadClock {
   double last_ = read();
 };
 
+// NEES speaks of a prior whose mean was drawn with the covariance that the estimator is given. Exact means leave no
+// room for it at all, and a fixed mean of td none for td's.
+void withhold_nees(const sim::PriorConfig& prior, std::vector<eval::Metric>& metrics) {
+  const bool exact = prior.means == sim::PriorMeans::kTruth;
+  for (eval::Metric& metric : metrics) {
+    if (exact || (prior.td_mean_s && metric.name == "td_error_s")) {
+      metric.nees.reset();
+      metric.nees_dof = 0;
+    }
+  }
+}
+
 }  // namespace
 
 eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, TrialTimings* timings) {
@@ -37,6 +49,7 @@ eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, T
   const core::EstimateLog estimate = estimator::estimate(measurements, experiment.estimator);
   t.estimate_s = clock.lap();
   eval::TrialResult result = eval::evaluate(estimate, truth, experiment.metrics);
+  withhold_nees(experiment.scenario.prior, result.metrics);
   t.evaluate_s = clock.lap();
   if (timings != nullptr) *timings = t;
   return result;

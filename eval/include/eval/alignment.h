@@ -12,7 +12,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,7 +22,7 @@
 
 namespace plumbline::eval {
 
-enum class Alignment : std::uint8_t { kNone, kPosyaw, kSe3, kSim3 };
+enum class Alignment { kNone, kPosyaw, kSe3, kSim3 };
 inline constexpr std::array<std::string_view, 4> kAlignmentNames = {"none", "posyaw", "se3", "sim3"};
 
 // x -> s R x + t

@@ -41,7 +41,7 @@ std::string to_line(const Row& row);
 // Strict: a missing, unknown or mistyped key throws core::DataError `where: rule`.
 Row parse_row(std::string_view line, const std::string& where);
 
-enum class Tail : std::uint8_t {
+enum class Tail {
   kWhole,    // every line must be complete
   kMayTear,  // a last line without its end, of a writer that was killed, is left out
 };

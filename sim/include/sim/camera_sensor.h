@@ -47,6 +47,7 @@ class FrameView {
   Eigen::Vector3d omega_C_;  // of the camera, in camera axes
   double cos_half_angle_;    // of the cone about the optical axis that holds the picture and the margin
   double reach_m_;           // how far the camera moves during half the readout
+  double turn_rad_;          // how far it turns
 };
 
 struct CameraRecording {

@@ -1,0 +1,297 @@
+// The program as its users meet it: exit codes, messages, files, determinism.
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace plumbline {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+std::string read(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+// The names of the files below a folder, sorted.
+std::vector<std::string> listing(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    names.push_back(fs::relative(entry.path(), folder).generic_string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+struct Result {
+  int code = -1;
+  std::string out;
+  std::string err;
+};
+
+class CommandLine : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "plumbline-XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    // A second of simulated work that takes a tenth of one.
+    write("small.yaml", R"(experiment: {trials: 3, seed: 5, axes: {scenario.camera.td_s: [0, 0.02]}}
+scenario:
+  duration_s: 3
+  imu: {gyro_noise_density_rad_s_sqrt_hz: 1.7e-4, gyro_bias_walk_rad_s2_sqrt_hz: 2.0e-5,
+        accel_noise_density_m_s2_sqrt_hz: 2.0e-3, accel_bias_walk_m_s3_sqrt_hz: 3.0e-3}
+  camera: {readout_s: 0.03}
+  world: {landmarks: 1000}
+  points: {per_frame: 20}
+)");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+
+  Result plumbline(const std::string& arguments) {
+    const std::string command = "cd '" + folder_.string() + "' && '" PLUMBLINE_PROGRAM "' " + arguments +
+                                " >stdout.txt 2>stderr.txt </dev/null";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, read(folder_ / "stdout.txt"), read(folder_ / "stderr.txt")};
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(CommandLine, VersionHelpAndNoCommand) {
+  const Result version = plumbline("--version");
+  EXPECT_EQ(version.code, 0);
+  EXPECT_THAT(version.out, HasSubstr("plumbline 0.1.0"));
+  EXPECT_EQ(plumbline("--help").code, 0);
+  EXPECT_EQ(plumbline("").code, 2);
+  EXPECT_EQ(plumbline("fly").code, 2);
+}
+
+TEST_F(CommandLine, RunWritesTheSameBytesForAnyNumberOfThreads) {
+  const Result one = plumbline("run small.yaml --jobs 1 --out one");
+  ASSERT_EQ(one.code, 0) << one.err;
+  EXPECT_THAT(one.out, HasSubstr("td error"));
+  EXPECT_THAT(one.out, HasSubstr("3/3 ok"));
+  const std::string results = read(folder_ / "one/results.jsonl");
+  EXPECT_EQ(std::count(results.begin(), results.end(), '\n'), 6);
+  for (const char* jobs : {"2", "8"}) {
+    const std::string out = std::string("jobs") + jobs;
+    ASSERT_EQ(plumbline("run small.yaml --jobs " + std::string(jobs) + " --out " + out).code, 0);
+    EXPECT_EQ(read(folder_ / out / "results.jsonl"), results);
+    EXPECT_EQ(listing(folder_ / out), listing(folder_ / "one"));
+    for (const std::string& name : listing(folder_ / "one/series")) {
+      EXPECT_EQ(read(folder_ / out / "series" / name), read(folder_ / "one/series" / name));
+    }
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "one/timings.jsonl"));
+  EXPECT_EQ(read(folder_ / "one/incidents.jsonl"), "");
+}
+
+TEST_F(CommandLine, SummaryIsJsonWithTheStatedKeys) {
+  const Result result = plumbline("run small.yaml --json --out out");
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto summary = nlohmann::json::parse(result.out);
+  EXPECT_EQ(summary, nlohmann::json::parse(read(folder_ / "out/summary.json")));
+  EXPECT_EQ(summary["experiment"], "small");
+  ASSERT_EQ(summary["cells"].size(), 2U);
+  const auto& cell = summary["cells"][1];
+  EXPECT_EQ(cell["axes"]["scenario.camera.td_s"], 0.02);
+  EXPECT_EQ(cell["n"], 3);
+  EXPECT_EQ(cell["n_ok"], 3);
+  for (const char* name : {"ate_position_m", "ate_rotation_deg", "td_error_s", "readout_error_s",
+                           "extrinsic_position_m", "extrinsic_rotation_deg", "extrinsic", "final_pose",
+                           "final_velocity", "final_bias"}) {
+    ASSERT_TRUE(cell["metrics"].contains(name)) << name;
+    for (const char* figure : {"mean", "rmse", "median", "std", "rmse_ci95"}) {
+      EXPECT_TRUE(cell["metrics"][name].contains(figure)) << name << " " << figure;
+    }
+  }
+  EXPECT_EQ(cell["metrics"]["extrinsic"]["nees_dof"], 6);
+  EXPECT_TRUE(summary.contains("runtime_s"));
+}
+
+TEST_F(CommandLine, ReplayGivesTheStoredRow) {
+  ASSERT_EQ(plumbline("run small.yaml --out out").code, 0);
+  const std::string results = read(folder_ / "out/results.jsonl");
+  const auto row = nlohmann::json::parse(results.substr(results.rfind('\n', results.size() - 2) + 1));
+  const std::string id = row["run_id"];
+  const Result replay = plumbline("replay out " + id + " --out looked_at");
+  EXPECT_EQ(replay.code, 0) << replay.err;
+  EXPECT_THAT(replay.err, HasSubstr("identical"));
+  EXPECT_THAT(results, HasSubstr(replay.out));
+  EXPECT_TRUE(fs::exists(folder_ / "looked_at/dataset/mav0/imu0/data.csv"));
+  EXPECT_EQ(plumbline("replay out 0123456789abcdef").code, 2);
+}
+
+// Simulated, written, read and estimated equals the run in memory; and the estimator never needs the truth.
+TEST_F(CommandLine, TheDatasetOnDiskEstimatesToTheSameBytesWithoutItsTruth) {
+  write("scenario.yaml", "duration_s: 3\nworld: {landmarks: 1000}\npoints: {per_frame: 20}\n"
+                         "imu: {gyro_noise_density_rad_s_sqrt_hz: 1.7e-4, gyro_bias_walk_rad_s2_sqrt_hz: 2.0e-5, "
+                         "accel_noise_density_m_s2_sqrt_hz: 2.0e-3, accel_bias_walk_m_s3_sqrt_hz: 3.0e-3}\n");
+  ASSERT_EQ(plumbline("simulate scenario.yaml --out data --seed 3").code, 0);
+  const Result with_truth = plumbline("estimate data --out with_truth");
+  ASSERT_EQ(with_truth.code, 0) << with_truth.err;
+  const Result scored = plumbline("evaluate with_truth --truth data --json");
+  ASSERT_EQ(scored.code, 0) << scored.err;
+  EXPECT_LT(nlohmann::json::parse(scored.out)["ate_position_m"]["rmse"], 0.1);
+
+  // Scrambled, then gone.
+  std::ofstream(folder_ / "data/truth/calibration.yaml") << "not: the truth\n";
+  ASSERT_EQ(plumbline("estimate data --out scrambled").code, 0);
+  fs::remove_all(folder_ / "data/truth");
+  ASSERT_EQ(plumbline("estimate data --out without_truth").code, 0);
+  for (const std::string& name : listing(folder_ / "with_truth")) {
+    EXPECT_EQ(read(folder_ / "scrambled" / name), read(folder_ / "with_truth" / name));
+    EXPECT_EQ(read(folder_ / "without_truth" / name), read(folder_ / "with_truth" / name));
+  }
+}
+
+// The same trial in memory and by way of the disk.
+TEST_F(CommandLine, MemoryAndDiskGiveTheSameEstimate) {
+  ASSERT_EQ(plumbline("run small.yaml --out out --trials 1").code, 0);
+  const std::string results = read(folder_ / "out/results.jsonl");
+  const std::string id = nlohmann::json::parse(results.substr(0, results.find('\n')))["run_id"];
+  ASSERT_EQ(plumbline("replay out " + id + " --out memory").code, 0);
+  ASSERT_EQ(plumbline("estimate memory/dataset --out disk").code, 0);
+  for (const std::string& name : listing(folder_ / "disk")) {
+    EXPECT_EQ(read(folder_ / "disk" / name), read(folder_ / "memory/estimate" / name)) << name;
+  }
+}
+
+TEST_F(CommandLine, BadInputIsOneLineExitTwoAndNothingWritten) {
+  struct Case {
+    const char* arguments;
+    const char* message;
+  };
+  write("unknown.yaml", "experiment:\n  trials: 3\n  seeed: 1\n");
+  write("type.yaml", "scenario:\n  camera:\n    rate_hz: fast\n");
+  write("range.yaml", "scenario:\n  duration_s: -1\n");
+  write("quaternion.yaml", "scenario:\n  camera:\n    extrinsic_rotation_xyzw: [0, 0, 0, 0.5]\n");
+  write("include.yaml", "scenario: nowhere.yaml\n");
+  write("axis.yaml", "experiment:\n  axes:\n    scenario.camera.td_s: 3\n");
+  write("noise.yaml", "experiment: {trials: 1}\n");
+  write("spline.yaml", "scenario:\n  trajectory:\n    type: spline\n    file: poses.txt\n");
+  const std::array<Case, 13> cases = {{
+      {"run absent.yaml", "absent.yaml"},
+      {"run unknown.yaml", "unknown.yaml:3: experiment.seeed: unknown key; did you mean 'seed'?"},
+      {"run type.yaml", "type.yaml:3: scenario.camera.rate_hz"},
+      {"run range.yaml", "range.yaml:2: scenario.duration_s"},
+      {"run quaternion.yaml", "quaternion.yaml:3: scenario.camera.extrinsic_rotation_xyzw: must be a unit quaternion"},
+      {"run include.yaml", "include.yaml:1: scenario: no such file"},
+      {"run axis.yaml", "axis.yaml:3: experiment.axes.scenario.camera.td_s: must be a list"},
+      {"run noise.yaml", "estimator.imu.gyro_noise_density_rad_s_sqrt_hz: must be > 0"},
+      {"run spline.yaml", "poses.txt"},
+      {"run small.yaml --set scenario.camera.td=1", "--set scenario.camera.td=1: unknown key; did you mean 'td_s'?"},
+      {"run small.yaml --set estimator.type=magic", "--set estimator.type=magic"},
+      {"estimate nowhere --out est", "nowhere/meta.yaml"},
+      {"evaluate nothing.tum --truth nothing.tum", "nothing.tum"},
+  }};
+  for (const Case& c : cases) {
+    const Result result = plumbline(c.arguments);
+    EXPECT_EQ(result.code, 2) << c.arguments;
+    EXPECT_THAT(result.err, HasSubstr(c.message)) << c.arguments;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "") << c.arguments;
+    EXPECT_FALSE(fs::exists(folder_ / "out")) << c.arguments;
+    EXPECT_FALSE(fs::exists(folder_ / "est")) << c.arguments;
+  }
+}
+
+TEST_F(CommandLine, ResultsOfAnotherConfigurationAreNotOverwritten) {
+  ASSERT_EQ(plumbline("run small.yaml --out out --trials 2").code, 0);
+  const std::string before = read(folder_ / "out/results.jsonl");
+  const Result other = plumbline("run small.yaml --out out --set scenario.camera.pixel_sigma_px=2");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_THAT(other.err, HasSubstr("--fresh"));
+  EXPECT_EQ(plumbline("run small.yaml --out out --trials 1").code, 2);  // fewer trials would lose rows
+  EXPECT_EQ(read(folder_ / "out/results.jsonl"), before);
+  // More trials extend it, and the first rows stay as they were.
+  ASSERT_EQ(plumbline("run small.yaml --out out --trials 3").code, 0);
+  const std::string extended = read(folder_ / "out/results.jsonl");
+  EXPECT_THAT(extended, HasSubstr(before.substr(0, before.find('\n'))));
+  EXPECT_EQ(plumbline("run small.yaml --out out --fresh --set scenario.camera.pixel_sigma_px=2").code, 0);
+}
+
+TEST_F(CommandLine, SetOnAnAxisReplacesIt) {
+  const Result result = plumbline("run small.yaml --json --trials 1 --set scenario.camera.td_s=0.01 --out out");
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto summary = nlohmann::json::parse(result.out);
+  ASSERT_EQ(summary["cells"].size(), 1U);
+  EXPECT_TRUE(summary["cells"][0]["axes"].empty());
+}
+
+TEST_F(CommandLine, FailedTrialsAreCountedAndDecideTheExitCode) {
+  const std::string failing = "run small.yaml --trials 1 --set estimator.pixel_sigma_px=0.05 ";
+  const Result result = plumbline(failing + "--out out --json");
+  EXPECT_EQ(result.code, 1);
+  const auto summary = nlohmann::json::parse(result.out);
+  EXPECT_EQ(summary["cells"][0]["n"], 1);
+  EXPECT_EQ(summary["cells"][0]["n_ok"], 0);
+  EXPECT_THAT(read(folder_ / "out/results.jsonl"), HasSubstr("false_minimum"));
+  EXPECT_EQ(plumbline(failing + "--out allowed --set experiment.max_failed_share=1").code, 0);
+}
+
+TEST_F(CommandLine, EvaluateTellsUnusableFromUnreadable) {
+  std::string truth;
+  for (int i = 0; i < 10; ++i) {
+    truth += std::to_string(i) + ".0 " + std::to_string(i * i) + " " + std::to_string(i) + " 0 0 0 0 1\n";
+  }
+  write("truth.tum", truth);
+  EXPECT_EQ(plumbline("evaluate truth.tum --truth truth.tum").code, 0);
+  write("nan.tum", "0.0 nan 0 0 0 0 0 1\n" + truth.substr(truth.find('\n') + 1));
+  const Result unusable = plumbline("evaluate nan.tum --truth truth.tum --json");
+  EXPECT_EQ(unusable.code, 1);
+  EXPECT_EQ(nlohmann::json::parse(unusable.out)["ok"], false);
+  write("broken.tum", "0.0 1 2\n");
+  EXPECT_EQ(plumbline("evaluate broken.tum --truth truth.tum").code, 2);
+  EXPECT_EQ(plumbline("evaluate truth.tum --truth truth.tum --align sideways").code, 2);
+}
+
+TEST_F(CommandLine, CheckTellsWhatAFileIs) {
+  const std::string configs = PLUMBLINE_SOURCE_DIR "/configs";
+  for (const char* kind : {"experiments", "scenarios", "estimators"}) {
+    for (const auto& file : fs::directory_iterator(fs::path(configs) / kind)) {
+      std::string arguments = "check '" + file.path().string() + "'";
+      if (file.path().filename().string().starts_with("recorded")) {
+        EXPECT_EQ(plumbline(arguments).code, 2);  // names no pose file of its own
+        std::string poses;
+        for (int i = 0; i <= 50 * 20; ++i) poses += std::to_string(i * 0.05) + " 1 2 3 0 0 0 1\n";
+        arguments += " --set scenario.trajectory.file=" + write("poses.tum", poses).string();
+      }
+      const Result result = plumbline(arguments);
+      EXPECT_EQ(result.code, 0) << result.err;
+      EXPECT_THAT(result.out, HasSubstr(std::string(kind).substr(0, std::string(kind).size() - 1)));
+    }
+  }
+  EXPECT_EQ(plumbline("check small.yaml --set scenario.camera.rate_hz=0").code, 2);
+}
+
+// configs/README.md holds the table that the program prints.
+TEST_F(CommandLine, ConfigsReadmeListsEveryKey) {
+  const Result keys = plumbline("check --keys");
+  ASSERT_EQ(keys.code, 0);
+  EXPECT_THAT(read(PLUMBLINE_SOURCE_DIR "/configs/README.md"), HasSubstr(keys.out))
+      << "paste the output of `plumbline check --keys` into configs/README.md";
+}
+
+}  // namespace
+}  // namespace plumbline

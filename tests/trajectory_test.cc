@@ -1,0 +1,332 @@
+#include "sim/trajectory.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/pose_file.h"
+#include "sim/harmonic_trajectory.h"
+#include "sim/spline_trajectory.h"
+
+namespace plumbline::sim {
+namespace {
+
+constexpr core::TrialId kId{.seed = 1, .trial = 0};
+constexpr double kDurationS = 8.0;
+
+// The motion of configs/scenarios/handheld_rs.yaml.
+HandheldConfig handheld_rs() { return {.speed_rms_m_s = 0.7, .rate_rms_rad_s = 0.75}; }
+
+HarmonicTrajectory recorded() { return HarmonicTrajectory(handheld_shape(handheld_rs(), kId)); }
+
+constexpr core::TimeNs kFirstStampNs = 1'403'636'580'000'000'000;  // the time of a file counts from its first pose
+
+// Samples of the recorded motion at 20 Hz, [0, length_s].
+std::vector<core::StampedPose> samples(double length_s = 12.0) {
+  const HarmonicTrajectory trajectory = recorded();
+  std::vector<core::StampedPose> poses;
+  for (int i = 0; 0.05 * i <= length_s + 1e-9; ++i) {
+    poses.push_back({kFirstStampNs + i * core::TimeNs{50'000'000}, trajectory.pose_at(0.05 * i)});
+  }
+  return poses;
+}
+
+void add_noise(std::vector<core::StampedPose>& poses, double position_sigma_m, double rotation_sigma_rad) {
+  const core::RandomStream stream(kId, "test/pose_noise");
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    poses[i].T_W_B.p += position_sigma_m * stream.normal3(i, 0);
+    poses[i].T_W_B.q = poses[i].T_W_B.q * core::exp_quaternion(rotation_sigma_rad * stream.normal3(i, 1));
+  }
+}
+
+TrajectoryConfig config_of(TrajectoryType type) {
+  TrajectoryConfig config;
+  config.type = type;
+  config.handheld = handheld_rs();
+  if (type == TrajectoryType::kSpline) {
+    std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::ranges::replace(test, '/', '_');
+    config.file = std::filesystem::path(testing::TempDir()) / ("plumbline_trajectory_" + test + ".tum");
+    std::vector<core::StampedPose> poses = samples();
+    add_noise(poses, 0.01, 0.01);
+    core::write_tum(config.file, poses);
+  }
+  return config;
+}
+
+std::string refusal(const std::vector<core::StampedPose>& poses, const TrajectoryConfig& config, double duration_s) {
+  try {
+    fit_spline(poses, config, duration_s);
+  } catch (const core::DataError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+double rotation_distance(const core::Pose& a, const core::Pose& b) {
+  return core::rotation_angle(a.q.conjugate() * b.q);
+}
+
+// Derivative of f at 0, of fourth order. Motion slower than 2 Hz has f^(5) < 13^4 of the derivative itself, or 10 times
+// that within a spline that follows noise: with h = 1e-3 the truncation h^4 f^(5)/30 is below 1e-8, the rounding 1e-12.
+constexpr double kRelative = 1e-7;
+template <class F>
+Eigen::Vector3d derivative(const F& f) {
+  constexpr double kStepS = 1e-3;
+  return (8.0 * (f(kStepS) - f(-kStepS)) - (f(2.0 * kStepS) - f(-2.0 * kStepS))) / (12.0 * kStepS);
+}
+
+class EveryTrajectory : public testing::TestWithParam<TrajectoryType> {};
+
+TEST_P(EveryTrajectory, DerivativesMatchDifferences) {
+  const auto trajectory = make_trajectory(config_of(GetParam()), kDurationS, kId);
+  const MotionStrength strength = motion_strength(*trajectory, kDurationS);
+  for (int i = 0; i < 60; ++i) {
+    // Clear of the knots of the spline, where f^(5) jumps.
+    const double t = 0.1 * (i + 1) + 0.005 + 0.09 * std::fmod(0.618 * i, 1.0);
+    const Kinematics k = trajectory->at(t);
+    const auto position = [&](double s) -> Eigen::Vector3d { return trajectory->pose_at(t + s).p; };
+    const auto rotation = [&](double s) {
+      return core::log_so3(Eigen::Quaterniond(k.T_W_B.q.conjugate() * trajectory->pose_at(t + s).q));
+    };
+    const auto velocity = [&](double s) -> Eigen::Vector3d { return trajectory->at(t + s).v_W; };
+    const auto rate = [&](double s) -> Eigen::Vector3d { return trajectory->at(t + s).omega_B; };
+    EXPECT_LT((k.v_W - derivative(position)).norm(), kRelative * strength.speed_rms_m_s) << t;
+    EXPECT_LT((k.a_W - derivative(velocity)).norm(), kRelative * strength.acceleration_rms_m_s2) << t;
+    EXPECT_LT((k.omega_B - derivative(rotation)).norm(), kRelative * strength.rate_rms_rad_s) << t;
+    EXPECT_LT((k.alpha_B - derivative(rate)).norm(), kRelative * strength.angular_acceleration_rms_rad_s2) << t;
+  }
+}
+
+TEST_P(EveryTrajectory, PoseIsThatOfTheKinematics) {
+  const auto trajectory = make_trajectory(config_of(GetParam()), kDurationS, kId);
+  for (int i = 0; i <= 200; ++i) {
+    const double t = kDurationS * i / 200.0;
+    const core::Pose pose = trajectory->pose_at(t);
+    const core::Pose other = trajectory->at(t).T_W_B;
+    // The same sums, perhaps in another order.
+    EXPECT_LT((pose.p - other.p).norm(), 1e-14);
+    EXPECT_LT(rotation_distance(pose, other), 1e-14);
+    EXPECT_NEAR(pose.q.norm(), 1.0, 1e-15);
+  }
+}
+
+TEST_P(EveryTrajectory, TrialsShareTheMotion) {
+  const TrajectoryConfig config = config_of(GetParam());
+  const auto a = make_trajectory(config, kDurationS, {.seed = 1, .trial = 0});
+  const auto b = make_trajectory(config, kDurationS, {.seed = 1, .trial = 5});
+  const auto other = make_trajectory(config, kDurationS, {.seed = 2, .trial = 0});
+  EXPECT_EQ(a->pose_at(3.3).p, b->pose_at(3.3).p);
+  EXPECT_EQ(a->pose_at(3.3).q.coeffs(), b->pose_at(3.3).q.coeffs());
+  const bool random = GetParam() == TrajectoryType::kHandheld;
+  EXPECT_EQ((a->pose_at(3.3).p - other->pose_at(3.3).p).norm() > 0.01, random);
+  EXPECT_EQ(rotation_distance(a->pose_at(3.3), other->pose_at(3.3)) > 0.01, random);
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, EveryTrajectory,
+                         testing::Values(TrajectoryType::kHandheld, TrajectoryType::kFigureEight,
+                                         TrajectoryType::kCircle, TrajectoryType::kSpline),
+                         [](const auto& type) {
+                           std::string name(kTrajectoryTypeNames[static_cast<std::size_t>(type.param)]);
+                           std::erase(name, '_');
+                           return name;
+                         });
+
+// Over 30 periods of the slowest sinusoid each mean square is within 1/(4 pi 30) = 0.3 % of its own; sums of sinusoids
+// of neighbouring bands and the coupling of the Euler angles add a few per cent.
+TEST(Handheld, MovesAsStronglyAsConfigured) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const HarmonicTrajectory trajectory(handheld_shape(handheld_rs(), {.seed = seed, .trial = 0}));
+    const MotionStrength strength = motion_strength(trajectory, 300.0);
+    EXPECT_NEAR(strength.speed_rms_m_s, 0.7, 0.05 * 0.7) << seed;
+    EXPECT_NEAR(strength.rate_rms_rad_s, 0.75, 0.05 * 0.75) << seed;
+  }
+}
+
+// The published setting of td estimation speaks of turns of 1 to 1.5 rad/s.
+TEST(Handheld, PeakRateOfTheReferenceSetting) {
+  const MotionStrength strength = motion_strength(recorded(), 15.0);
+  EXPECT_GT(strength.rate_peak_rad_s, 1.0);
+  EXPECT_LT(strength.rate_peak_rad_s, 1.5);
+}
+
+TEST(Loops, ComeRoundWithTheBodyAhead) {
+  const LoopConfig config{.radius_m = 2.0, .height_amplitude_m = 0.3, .period_s = 10.0};
+  for (const HarmonicTrajectory::Shape& shape : {circle_shape(config), figure_eight_shape(config)}) {
+    const HarmonicTrajectory trajectory(shape);
+    EXPECT_LT((trajectory.pose_at(12.5).p - trajectory.pose_at(2.5).p).norm(), 1e-13);
+    for (const double t : {0.0, 1.0, 4.2, 7.7}) {
+      const Kinematics k = trajectory.at(t);
+      const Eigen::Vector3d x = k.T_W_B.q * Eigen::Vector3d::UnitX();
+      EXPECT_NEAR(std::remainder(std::atan2(x.y(), x.x()) - std::atan2(k.v_W.y(), k.v_W.x()), 6.283185307179586), 0.0,
+                  1e-13);
+    }
+  }
+  EXPECT_NEAR(HarmonicTrajectory(circle_shape(config)).pose_at(3.0).p.head<2>().norm(), 2.0, 1e-14);
+}
+
+// Controls on a line at constant speed and rate give just that motion; control j has its centre at (j - 2) knots.
+TEST(Spline, ReproducesConstantTwist) {
+  const Eigen::Vector3d v(1.0, -2.0, 0.5);
+  const Eigen::Vector3d omega(0.3, 0.5, -0.7);
+  const Eigen::Quaterniond q0 = core::exp_quaternion(Eigen::Vector3d(1.0, 0.2, -0.4));
+  constexpr double kKnotS = 0.5;
+  std::vector<core::Pose> controls;
+  for (int j = 0; j < 9; ++j) {
+    const double t = kKnotS * (j - 2);
+    controls.push_back({q0 * core::exp_quaternion(t * omega), t * v});
+  }
+  const SplineTrajectory spline(controls, kKnotS);
+  EXPECT_DOUBLE_EQ(spline.end_s(), 4 * kKnotS);  // 6 controls a segment
+  for (const double t : {0.0, 0.3, 0.5, 1.234, 2.0}) {
+    const Kinematics k = spline.at(t);
+    EXPECT_LT((k.T_W_B.p - t * v).norm(), 1e-13);
+    EXPECT_LT(rotation_distance(k.T_W_B, {q0 * core::exp_quaternion(t * omega), t * v}), 1e-13);
+    EXPECT_LT((k.v_W - v).norm(), 1e-12);
+    EXPECT_LT((k.omega_B - omega).norm(), 1e-12);
+    EXPECT_LT(k.a_W.norm(), 1e-11);  // cancels terms of 2/knot^2
+    EXPECT_LT(k.alpha_B.norm(), 1e-11);
+  }
+}
+
+// C^4: what the IMU sees and its slope do not jump at a knot.
+TEST(Spline, AccelerationIsSmoothAcrossKnots) {
+  std::vector<core::StampedPose> poses = samples();
+  add_noise(poses, 0.01, 0.01);
+  const SplineTrajectory spline = fit_spline(poses, {}, kDurationS).trajectory;
+  constexpr double kEpsilonS = 1e-9;
+  for (int knot = 1; knot < 80; ++knot) {
+    const Kinematics before = spline.at(0.1 * knot - kEpsilonS);
+    const Kinematics after = spline.at(0.1 * knot + kEpsilonS);
+    // A jerk of 100 m/s^3 over 2e-9 s.
+    EXPECT_LT((after.a_W - before.a_W).norm(), 1e-6) << knot;
+    EXPECT_LT((after.alpha_B - before.alpha_B).norm(), 1e-6) << knot;
+  }
+}
+
+// Quintic splines of 0.1 s knots on motion of at most 1.2 Hz, amplitude 0.04 m there: (omega h)^6/30240 of it is 2e-7
+// m, a few times more at the ends of the data.
+TEST(Spline, FitsSamplesOfASmoothMotion) {
+  const HarmonicTrajectory truth = recorded();
+  const SplineFit fit = fit_spline(samples(), {}, kDurationS);
+  EXPECT_LT(fit.residuals.position_rms_m, 1e-6);
+  EXPECT_LT(fit.residuals.rotation_rms_rad, 1e-6);
+  EXPECT_GE(fit.trajectory.end_s(), kDurationS);
+  for (int i = 0; i <= 1000; ++i) {
+    const double t = kDurationS * i / 1000.0;
+    const Kinematics k = fit.trajectory.at(t);
+    const Kinematics expected = truth.at(t);
+    EXPECT_LT((k.T_W_B.p - expected.T_W_B.p).norm(), 1e-5) << t;
+    EXPECT_LT(rotation_distance(k.T_W_B, expected.T_W_B), 1e-5) << t;
+    EXPECT_LT((k.omega_B - expected.omega_B).norm(), 2e-3) << t;
+  }
+}
+
+TEST(Spline, StartShiftsTime) {
+  const HarmonicTrajectory truth = recorded();
+  for (const double start_s : {0.02, 2.0, 3.517}) {
+    TrajectoryConfig config;
+    config.start_s = start_s;
+    const SplineTrajectory spline = fit_spline(samples(), config, kDurationS).trajectory;
+    for (const double t : {0.0, 0.7, 4.0, kDurationS}) {
+      EXPECT_LT((spline.pose_at(t).p - truth.pose_at(start_s + t).p).norm(), 1e-5) << start_s << ' ' << t;
+      EXPECT_LT(rotation_distance(spline.pose_at(t), truth.pose_at(start_s + t)), 1e-5) << start_s << ' ' << t;
+    }
+  }
+}
+
+TEST(Spline, SignsOfQuaternionsDoNotMatter) {
+  std::vector<core::StampedPose> poses = samples();
+  const SplineTrajectory expected = fit_spline(poses, {}, kDurationS).trajectory;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (i % 3 == 1) poses[i].T_W_B.q.coeffs() *= -1.0;
+  }
+  const SplineTrajectory flipped = fit_spline(poses, {}, kDurationS).trajectory;
+  for (int i = 0; i <= 100; ++i) {
+    const double t = kDurationS * i / 100.0;
+    EXPECT_LT(rotation_distance(flipped.pose_at(t), expected.pose_at(t)), 1e-12) << t;
+    EXPECT_LT((flipped.at(t).omega_B - expected.at(t).omega_B).norm(), 1e-10) << t;
+  }
+}
+
+// White noise of 10 mrad at 20 Hz: knots of 0.1 s follow half of it, which fakes angular acceleration of its amplitude
+// times (pi/knot)^2. Wider ones let the residual grow towards the noise itself.
+TEST(Spline, WiderKnotsSmooth) {
+  std::vector<core::StampedPose> poses = samples();
+  add_noise(poses, 0.01, 0.01);
+  const double true_rms = motion_strength(recorded(), kDurationS).angular_acceleration_rms_rad_s2;
+  double last_strength = 1e9;
+  double last_residual = 0.0;
+  for (const double knot_s : {0.05, 0.1, 0.2}) {
+    TrajectoryConfig config;
+    config.knot_interval_s = knot_s;
+    const SplineFit fit = fit_spline(poses, config, kDurationS);
+    const double strength = motion_strength(fit.trajectory, kDurationS).angular_acceleration_rms_rad_s2;
+    EXPECT_LT(strength, 0.5 * last_strength) << knot_s;
+    EXPECT_GT(fit.residuals.rotation_rms_rad, last_residual) << knot_s;
+    EXPECT_GT(strength, true_rms) << knot_s;
+    last_strength = strength;
+    last_residual = fit.residuals.rotation_rms_rad;
+  }
+  // Three axes of 10 mrad, of which the fit takes 1 in 4 degrees of freedom.
+  EXPECT_NEAR(last_residual, 0.01 * std::sqrt(3.0 * 0.75), 0.002);
+}
+
+TEST(Spline, RefusesGaps) {
+  const auto without = [](double from_s, double to_s) {
+    std::vector<core::StampedPose> poses = samples();
+    std::erase_if(poses, [&](const core::StampedPose& pose) {
+      const double t = core::to_seconds(pose.t_ns - kFirstStampNs);
+      return t > from_s + 1e-6 && t < to_s - 1e-6;
+    });
+    return poses;
+  };
+  TrajectoryConfig config;
+  config.file = "poses.tum";
+  config.start_s = 2.0;
+  config.largest_gap_s = 0.2;
+  EXPECT_THAT(refusal(without(4.0, 4.5), config, 5.0),
+              testing::AllOf(testing::StartsWith("poses.tum: gap of 0.500 s"),
+                             testing::HasSubstr("4.000 s and 4.500 s"), testing::HasSubstr("largest_gap_s")));
+  // Over the beginning or the end of the span, with no pose of the fit on the far side.
+  EXPECT_THAT(refusal(without(0.5, 3.0), config, 5.0), testing::HasSubstr("gap of 2.500 s"));
+  EXPECT_THAT(refusal(without(6.0, 11.0), config, 5.0), testing::HasSubstr("gap of 5.000 s"));
+  // No wider than allowed, or outside the span.
+  EXPECT_EQ(refusal(without(4.0, 4.2), config, 5.0), "accepted");
+  EXPECT_EQ(refusal(without(0.2, 0.8), config, 5.0), "accepted");
+  EXPECT_EQ(refusal(without(9.0, 10.0), config, 5.0), "accepted");
+}
+
+TEST(Spline, RefusesFilesThatAreTooShort) {
+  TrajectoryConfig config;
+  config.file = "poses.tum";
+  EXPECT_EQ(refusal(samples(8.0), config, 8.0), "accepted");
+  EXPECT_THAT(refusal(samples(7.95), config, 8.0), testing::HasSubstr("spans only 7.950 s"));
+  TrajectoryConfig late = config;
+  late.start_s = 0.5;
+  EXPECT_THAT(refusal(samples(8.0), late, 8.0), testing::HasSubstr("= 8.5 s"));
+  late.start_s = 100.0;
+  EXPECT_THAT(refusal(samples(8.0), late, 1.0), testing::HasSubstr("start_s"));
+  EXPECT_THAT(refusal({samples(8.0).front()}, config, 1.0), testing::HasSubstr("spans only 0.000 s"));
+}
+
+TEST(Spline, FilesGoThroughMakeTrajectory) {
+  TrajectoryConfig config = config_of(TrajectoryType::kSpline);
+  const FitResiduals residuals = fit_residuals(config, kDurationS).value_or(FitResiduals{});
+  EXPECT_GT(residuals.rotation_rms_rad, 0.005);
+  EXPECT_LT(residuals.rotation_rms_rad, 0.02);
+  EXPECT_FALSE(fit_residuals(config_of(TrajectoryType::kHandheld), kDurationS).has_value());
+  config.file += ".missing";
+  EXPECT_THROW(make_trajectory(config, kDurationS, kId), core::DataError);
+}
+
+}  // namespace
+}  // namespace plumbline::sim
