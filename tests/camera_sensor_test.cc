@@ -188,7 +188,7 @@ TEST(CameraSensor, PixelNoiseIsNormalAndNotTruncated) {
   double near_border = 0.0;
   int outside = 0;
   for (const auto& [key, pixel] : noisy) {
-    const Eigen::Vector2d clean = ideal.at(key);
+    const Eigen::Vector2d& clean = ideal.at(key);
     const Eigen::Vector2d e = (pixel - clean) / 5.0;
     sum += e;
     sum2 += e.squaredNorm();
@@ -320,7 +320,7 @@ TEST(CameraSensor, NoiseDoesNotDependOnTheTracks) {
     for (const auto& [key, pixel] : by_landmark(Scene(changed))) {
       const auto same = reference.find(key);
       if (same == reference.end()) continue;
-      const Eigen::Vector2d clean = ideal.at(key);
+      const Eigen::Vector2d& clean = ideal.at(key);
       // Rounding of pixels.
       EXPECT_LT(((pixel - clean) / changed.camera.pixel_sigma_px - (same->second - clean)).norm(), 1e-12);
       ++common;

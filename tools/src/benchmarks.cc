@@ -1,0 +1,102 @@
+// Google Benchmark of the parts that a trial spends its time in: build/<preset>/tools/plumbline_benchmarks
+#include <benchmark/benchmark.h>
+
+#include "estimator/estimate.h"
+#include "estimator/factors/imu_factor.h"
+#include "estimator/factors/point_factors.h"
+#include "sim/simulate.h"
+
+namespace plumbline {
+namespace {
+
+// The setting of configs/scenarios/handheld_rs.yaml.
+sim::ScenarioConfig handheld_rs() {
+  sim::ScenarioConfig c;
+  c.trajectory.handheld.rate_rms_rad_s = 0.75;
+  c.imu.noise = {1.7e-4, 2e-5, 2e-3, 3e-3};
+  c.camera.td_s = 0.02;
+  c.camera.readout_s = 0.03;
+  c.prior.td_sigma_s = 0.02;
+  return c;
+}
+
+void simulate(benchmark::State& state) {
+  const sim::ScenarioConfig config = handheld_rs();
+  std::uint64_t trial = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(sim::simulate(config, {1, trial++}));
+  state.counters["times_real_time"] =
+      benchmark::Counter(config.duration_s * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+BENCHMARK(simulate)->Unit(benchmark::kMillisecond);
+
+void batch_solve(benchmark::State& state) {
+  const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
+  int observations = 0;
+  for (auto _ : state) observations = estimator::estimate(s.measurements, {}).summary.observations;
+  state.counters["observations"] = observations;
+}
+BENCHMARK(batch_solve)->Unit(benchmark::kSecond)->Iterations(3);
+
+void preintegrate_20_samples(benchmark::State& state) {
+  const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
+  const std::span<const core::ImuSample> samples(s.measurements.imu.data(), 21);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(estimator::preintegrate(samples, {}, s.measurements.imu_noise));
+  }
+}
+BENCHMARK(preintegrate_20_samples);
+
+// One observation between two keyframes of the simulated recording, with or without Jacobians.
+void propagated_point(benchmark::State& state) {
+  using namespace estimator;
+  const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
+  const core::MeasurementLog& log = s.measurements;
+  const auto timing = [&](std::size_t frame) {
+    const core::TimeNs t = log.frames[frame].t_cam_ns;
+    const auto sample = static_cast<std::size_t>(core::to_seconds(t) * 200.0 + 4.0);
+    return std::pair(sample, FrameTiming{std::make_shared<LocalMotion>(log.imu, sample, 0.1, core::ImuBias{}),
+                                         core::to_seconds(t - log.imu[sample].t_ns)});
+  };
+  const auto [sample_i, timing_i] = timing(0);
+  const auto [sample_j, timing_j] = timing(4);
+  core::PointObservation seen_i;
+  core::PointObservation seen_j;
+  for (const core::PointObservation& a : log.frames[0].points) {
+    for (const core::PointObservation& b : log.frames[4].points) {
+      if (a.track_id == b.track_id) {
+        seen_i = a;
+        seen_j = b;
+      }
+    }
+  }
+  const PropagatedPointFactor factor({log.camera, 1.0, log.gravity_m_s2}, timing_i, timing_j, seen_j.pixel);
+  const StateBlock state_i = pack(s.truth.states[sample_i].state);
+  const StateBlock state_j = pack(s.truth.states[sample_j].state);
+  const PoseBlock extrinsics = pack(s.truth.calibration.T_B_C);
+  const double td = s.truth.calibration.td_s;
+  const double readout = s.truth.calibration.readout_s;
+  Eigen::Vector3d landmark = log.camera.unproject(seen_i.pixel);
+  landmark.z() = 0.2;
+  const std::array<const double*, 6> parameters = {state_i.data(), state_j.data(), extrinsics.data(),
+                                                   &td,            &readout,       landmark.data()};
+  std::array<double, 2 * kStateSize> J_i{};
+  std::array<double, 2 * kStateSize> J_j{};
+  std::array<double, 2 * kPoseSize> J_extrinsics{};
+  std::array<double, 2> J_td{};
+  std::array<double, 2> J_readout{};
+  std::array<double, 2 * kLandmarkSize> J_landmark{};
+  std::array<double*, 6> jacobians = {J_i.data(),  J_j.data(),       J_extrinsics.data(),
+                                      J_td.data(), J_readout.data(), J_landmark.data()};
+  Eigen::Vector2d residual;
+  for (auto _ : state) {
+    const bool ok = factor.Evaluate(parameters.data(), residual.data(), state.range(0) != 0 ? jacobians.data() : nullptr);
+    if (!ok) state.SkipWithError("the landmark is not seen");
+    benchmark::DoNotOptimize(residual);
+  }
+}
+BENCHMARK(propagated_point)->Arg(0)->Arg(1)->ArgName("jacobians");
+
+}  // namespace
+}  // namespace plumbline
+
+BENCHMARK_MAIN();

@@ -1,20 +1,41 @@
+#include <map>
+#include <vector>
+
 #include <fmt/format.h>
 
 #include "tools/commands.h"
 #include "tools/experiment.h"
 
 namespace plumbline::tools {
+namespace {
+
+// A bar would end the cell.
+std::string cell(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) escaped += c == '|' ? "\\|" : std::string(1, c);
+  return escaped;
+}
+
+}  // namespace
 
 std::string key_table() {
-  std::string table;
+  // The keys of a section stay together, also those that come after a section inside it.
+  std::vector<core::KeyDoc> sections;
+  std::map<std::string, std::string> rows;
   for (const core::KeyDoc& key : core::document_config(Experiment{}, "")) {
     if (key.type == "section") {
-      table += fmt::format("\n### `{}`: {}\n\n| key | type | default | rule | meaning |\n|---|---|---|---|---|\n", key.key,
-                           key.doc);
+      sections.push_back(key);
       continue;
     }
-    table += fmt::format("| `{}` | {} | {} | {} | {} |\n", key.key, key.type,
-                         key.default_value.empty() ? "" : fmt::format("`{}`", key.default_value), key.rule, key.doc);
+    rows[key.key.substr(0, key.key.rfind('.'))] +=
+        fmt::format("| `{}` | {} | {} | {} | {} |\n", key.key, cell(key.type),
+                    key.default_value.empty() ? "" : fmt::format("`{}`", key.default_value), cell(key.rule),
+                    cell(key.doc));
+  }
+  std::string table;
+  for (const core::KeyDoc& section : sections) {
+    table += fmt::format("### `{}`: {}\n\n| key | type | default | rule | meaning |\n|---|---|---|---|---|\n{}\n",
+                         section.key, section.doc, rows[section.key]);
   }
   return table;
 }
