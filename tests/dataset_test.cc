@@ -196,7 +196,7 @@ class Dataset : public testing::Test {
     core::write_dataset(folder_, simulation_.measurements, {.config_hash = "0123456789abcdef", .seed = 3, .trial = 0});
     write_truth(folder_, simulation_.truth);
   }
-  ~Dataset() override { fs::remove_all(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
 
   std::string text(const fs::path& file) const {
     std::ifstream in(folder_ / file, std::ios::binary);
