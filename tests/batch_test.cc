@@ -58,7 +58,8 @@ Errors errors_of(const core::EstimateLog& estimate, const sim::GroundTruth& trut
   for (const core::StampedState& s : estimate.states) {
     sum += (s.state.T_W_B.p - sim::state_at(truth, s.t_ns).T_W_B.p).squaredNorm();
   }
-  return {estimate.calibration.td_s - truth.calibration.td_s, estimate.calibration.readout_s - truth.calibration.readout_s,
+  return {estimate.calibration.td_s - truth.calibration.td_s,
+          estimate.calibration.readout_s - truth.calibration.readout_s,
           (estimate.calibration.T_B_C.p - truth.calibration.T_B_C.p).norm(),
           std::sqrt(sum / static_cast<double>(estimate.states.size()))};
 }

@@ -1,6 +1,4 @@
 // The program as its users meet it: exit codes, messages, files, determinism.
-#include <sys/wait.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -14,6 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/wait.h>
 
 namespace plumbline {
 namespace {
@@ -117,9 +116,9 @@ TEST_F(CommandLine, SummaryIsJsonWithTheStatedKeys) {
   EXPECT_EQ(cell["axes"]["scenario.camera.td_s"], 0.02);
   EXPECT_EQ(cell["n"], 3);
   EXPECT_EQ(cell["n_ok"], 3);
-  for (const char* name : {"ate_position_m", "ate_rotation_deg", "td_error_s", "readout_error_s",
-                           "extrinsic_position_m", "extrinsic_rotation_deg", "extrinsic", "final_pose",
-                           "final_velocity", "final_bias"}) {
+  for (const char* name :
+       {"ate_position_m", "ate_rotation_deg", "td_error_s", "readout_error_s", "extrinsic_position_m",
+        "extrinsic_rotation_deg", "extrinsic", "final_pose", "final_velocity", "final_bias"}) {
     ASSERT_TRUE(cell["metrics"].contains(name)) << name;
     for (const char* figure : {"mean", "rmse", "median", "std", "rmse_ci95"}) {
       EXPECT_TRUE(cell["metrics"][name].contains(figure)) << name << " " << figure;
@@ -144,9 +143,10 @@ TEST_F(CommandLine, ReplayGivesTheStoredRow) {
 
 // Simulated, written, read and estimated equals the run in memory; and the estimator never needs the truth.
 TEST_F(CommandLine, TheDatasetOnDiskEstimatesToTheSameBytesWithoutItsTruth) {
-  write("scenario.yaml", "duration_s: 3\nworld: {landmarks: 1000}\npoints: {per_frame: 20}\n"
-                         "imu: {gyro_noise_density_rad_s_sqrt_hz: 1.7e-4, gyro_bias_walk_rad_s2_sqrt_hz: 2.0e-5, "
-                         "accel_noise_density_m_s2_sqrt_hz: 2.0e-3, accel_bias_walk_m_s3_sqrt_hz: 3.0e-3}\n");
+  write("scenario.yaml",
+        "duration_s: 3\nworld: {landmarks: 1000}\npoints: {per_frame: 20}\n"
+        "imu: {gyro_noise_density_rad_s_sqrt_hz: 1.7e-4, gyro_bias_walk_rad_s2_sqrt_hz: 2.0e-5, "
+        "accel_noise_density_m_s2_sqrt_hz: 2.0e-3, accel_bias_walk_m_s3_sqrt_hz: 3.0e-3}\n");
   ASSERT_EQ(plumbline("simulate scenario.yaml --out data --seed 3").code, 0);
   const Result with_truth = plumbline("estimate data --out with_truth");
   ASSERT_EQ(with_truth.code, 0) << with_truth.err;

@@ -88,7 +88,8 @@ inline Eigen::MatrixXd ridders_jacobian(const ceres::CostFunction& factor, const
       double factor2 = kShrink * kShrink;
       for (std::size_t j = 1; j <= i; ++j, factor2 *= kShrink * kShrink) {
         table[i].push_back((factor2 * table[i][j - 1] - table[i - 1][j - 1]) / (factor2 - 1.0));
-        const double error = std::max((table[i][j] - table[i][j - 1]).norm(), (table[i][j] - table[i - 1][j - 1]).norm());
+        const double error =
+            std::max((table[i][j] - table[i][j - 1]).norm(), (table[i][j] - table[i - 1][j - 1]).norm());
         if (error < best_error) {
           best_error = error;
           J.col(c) = table[i][j];
@@ -105,10 +106,9 @@ inline void expect_jacobian(const ceres::CostFunction& factor, const std::vector
   const Eigen::MatrixXd analytic = tangent_jacobian(factor, blocks, k);
   const Eigen::MatrixXd numeric = ridders_jacobian(factor, blocks, k, first_step);
   const double scale = std::max(numeric.cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_LT((analytic - numeric).cwiseAbs().maxCoeff() / scale, tolerance)
-      << "block " << k << "\nanalytic\n"
-      << analytic << "\nnumeric\n"
-      << numeric;
+  EXPECT_LT((analytic - numeric).cwiseAbs().maxCoeff() / scale, tolerance) << "block " << k << "\nanalytic\n"
+                                                                           << analytic << "\nnumeric\n"
+                                                                           << numeric;
 }
 
 }  // namespace plumbline::testing

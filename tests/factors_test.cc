@@ -110,8 +110,7 @@ TEST(Preintegration, BiasJacobiansMatchReintegration) {
     const ImuIncrement p = preintegrate(samples, plus, kNoise).increment;
     const ImuIncrement m = preintegrate(samples, minus, kNoise).increment;
     const ImuIncrement& x = base.increment;
-    const Eigen::Vector3d R_bg =
-        core::log_so3(Eigen::Quaterniond(Eigen::Matrix3d(m.R.transpose() * p.R))) / (2.0 * h);
+    const Eigen::Vector3d R_bg = core::log_so3(Eigen::Quaterniond(Eigen::Matrix3d(m.R.transpose() * p.R))) / (2.0 * h);
     // Central differences leave h^2 and rounding/h: 1e-10 of the step's effect.
     EXPECT_LT((x.R_bg.col(axis) - R_bg).norm(), 1e-9);
     EXPECT_LT((x.v_bg.col(axis) - (p.v - m.v) / (2.0 * h)).norm(), 1e-9);
@@ -241,7 +240,9 @@ struct PointScene {
   Eigen::Vector2d pixel;
 
   explicit PointScene(std::uint64_t i) {
-    const auto small = [&](std::uint64_t sub, double scale) -> Eigen::Vector3d { return scale * kRandom.normal3(i, sub); };
+    const auto small = [&](std::uint64_t sub, double scale) -> Eigen::Vector3d {
+      return scale * kRandom.normal3(i, sub);
+    };
     anchor = {.T_W_B = {core::exp_quaternion(small(20, 0.1)), small(21, 0.2)},
               .v_W = small(22, 0.7),
               .bias = {small(23, 0.02), small(24, 0.1)}};
@@ -257,9 +258,12 @@ struct PointScene {
 
   PropagatedPointFactor factor() const { return {model, {motion_a, offset_a}, {motion_b, offset_b}, pixel}; }
   std::vector<Block> blocks() const {
-    return {block(pack(anchor), &kStateManifold),      block(pack(observer), &kStateManifold),
-            block(pack(T_B_C), &kPoseManifold),        {{td}, nullptr},
-            {{readout}, nullptr},                      block(landmark)};
+    return {block(pack(anchor), &kStateManifold),
+            block(pack(observer), &kStateManifold),
+            block(pack(T_B_C), &kPoseManifold),
+            {{td}, nullptr},
+            {{readout}, nullptr},
+            block(landmark)};
   }
 };
 
@@ -311,9 +315,12 @@ TEST(PropagatedPointFactor, HandWorkedVector) {
   const PropagatedPointFactor factor(model, {motion, 0.0}, {motion, 0.0}, {0.3, 0.2});
   State observer;
   observer.T_W_B.p = {1, 0, 0};
-  const std::vector<Block> blocks = {block(pack(State{}), &kStateManifold), block(pack(observer), &kStateManifold),
-                                     block(pack(core::Pose{}), &kPoseManifold), {{0.0}, nullptr},
-                                     {{0.0}, nullptr},                          {{0.5, 0.25, 0.25}, nullptr}};
+  const std::vector<Block> blocks = {block(pack(State{}), &kStateManifold),
+                                     block(pack(observer), &kStateManifold),
+                                     block(pack(core::Pose{}), &kPoseManifold),
+                                     {{0.0}, nullptr},
+                                     {{0.0}, nullptr},
+                                     {{0.5, 0.25, 0.25}, nullptr}};
   const Eigen::VectorXd r = testing::residual(factor, blocks);
   EXPECT_NEAR(r.x(), -0.05, 1e-14);
   EXPECT_NEAR(r.y(), 0.05, 1e-14);

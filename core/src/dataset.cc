@@ -152,7 +152,8 @@ std::string to_yaml(const nlohmann::ordered_json& value) {
 }
 
 void write_dataset(const std::filesystem::path& folder, const MeasurementLog& log, const DatasetMeta& meta) {
-  if (std::filesystem::exists(folder) && !(std::filesystem::is_directory(folder) && std::filesystem::is_empty(folder))) {
+  if (std::filesystem::exists(folder) &&
+      !(std::filesystem::is_directory(folder) && std::filesystem::is_empty(folder))) {
     throw DataError(fmt::format("{}: exists and is not an empty folder", folder.generic_string()));
   }
   std::filesystem::create_directories(folder / "mav0/imu0");
@@ -210,9 +211,8 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
   while (imu.next()) {
     const TimeNs t_ns = imu.integer(0);
     check_increasing(imu, log.imu.empty() ? 0 : log.imu.back().t_ns, t_ns, log.imu.empty());
-    log.imu.push_back({t_ns,
-                       {imu.number(1), imu.number(2), imu.number(3)},
-                       {imu.number(4), imu.number(5), imu.number(6)}});
+    log.imu.push_back(
+        {t_ns, {imu.number(1), imu.number(2), imu.number(3)}, {imu.number(4), imu.number(5), imu.number(6)}});
   }
   CsvReader frames(folder / kFramesFile, 1);
   while (frames.next()) {

@@ -88,10 +88,9 @@ bool false_minimum(const BatchInput& input, const core::SolveSummary& summary) {
 void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
   const core::TimeNs first_ns = input.log.frames[input.keyframes.front()].t_cam_ns;
   const auto keyframes_until = [&](double end_s) {
-    return static_cast<std::size_t>(
-        std::count_if(input.keyframes.begin(), input.keyframes.end(), [&](std::size_t frame) {
-          return core::to_seconds(input.log.frames[frame].t_cam_ns - first_ns) <= end_s;
-        }));
+    return static_cast<std::size_t>(std::count_if(
+        input.keyframes.begin(), input.keyframes.end(),
+        [&](std::size_t frame) { return core::to_seconds(input.log.frames[frame].t_cam_ns - first_ns) <= end_s; }));
   };
   for (double end_s = kFirstStageS;; end_s *= 2.0) {
     const std::size_t count = keyframes_until(end_s);

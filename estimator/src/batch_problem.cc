@@ -41,9 +41,9 @@ void BatchProblem::add_priors() {
   const core::CalibrationSigmas& sigma = prior.calibration_sigma;
   problem_->AddResidualBlock(new StatePriorFactor(prior.mean, prior.sigma), nullptr, states_.front().data());
   if (input_.config.estimate.extrinsics) {
-    problem_->AddResidualBlock(new ExtrinsicsPriorFactor(prior.calibration.T_B_C, sigma.extrinsic_position_m,
-                                                         sigma.extrinsic_rotation_rad),
-                               nullptr, extrinsics_.data());
+    problem_->AddResidualBlock(
+        new ExtrinsicsPriorFactor(prior.calibration.T_B_C, sigma.extrinsic_position_m, sigma.extrinsic_rotation_rad),
+        nullptr, extrinsics_.data());
   }
   if (input_.config.estimate.td) {
     problem_->AddResidualBlock(new ScalarPriorFactor(prior.calibration.td_s, sigma.td_s), nullptr, &td_s_);
@@ -71,15 +71,13 @@ void BatchProblem::add_points() {
   // off.
   const core::CalibrationSigmas& sigma = input_.log.prior.calibration_sigma;
   const double sample_s = core::to_seconds(input_.log.imu[1].t_ns - input_.log.imu[0].t_ns);
-  const double reach_s =
-      0.5 * std::abs(start_.calibration.readout_s) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
+  const double reach_s = 0.5 * std::abs(start_.calibration.readout_s) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
   std::vector<FrameTiming> timings;
   for (std::size_t k = 0; k + 1 < states_.size(); ++k) {
     const std::size_t sample = start_.samples[k + 1];
     const core::TimeNs t_cam_ns = input_.log.frames[input_.keyframes[k]].t_cam_ns;
-    timings.push_back(
-        {std::make_shared<LocalMotion>(input_.log.imu, sample, reach_s, start_.states[k + 1].bias),
-         core::to_seconds(t_cam_ns - input_.log.imu[sample].t_ns)});
+    timings.push_back({std::make_shared<LocalMotion>(input_.log.imu, sample, reach_s, start_.states[k + 1].bias),
+                       core::to_seconds(t_cam_ns - input_.log.imu[sample].t_ns)});
   }
 
   const CameraModel model{input_.log.camera, input_.noise.pixel_sigma_px, input_.log.gravity_m_s2};
@@ -93,11 +91,13 @@ void BatchProblem::add_points() {
     std::vector<std::pair<std::unique_ptr<PropagatedPointFactor>, std::size_t>> factors;
     bool usable = true;
     for (auto o = observations.begin() + 1; o != observations.end() && o->keyframe < timings.size(); ++o) {
-      auto factor =
-          std::make_unique<PropagatedPointFactor>(model, timings[anchor], timings[o->keyframe], o->pixel);
-      const std::array<const double*, 6> blocks = {states_[anchor + 1].data(), states_[o->keyframe + 1].data(),
-                                                   extrinsics_.data(),         &td_s_,
-                                                   &readout_s_,                landmark.data()};
+      auto factor = std::make_unique<PropagatedPointFactor>(model, timings[anchor], timings[o->keyframe], o->pixel);
+      const std::array<const double*, 6> blocks = {states_[anchor + 1].data(),
+                                                   states_[o->keyframe + 1].data(),
+                                                   extrinsics_.data(),
+                                                   &td_s_,
+                                                   &readout_s_,
+                                                   landmark.data()};
       Eigen::Vector2d residual;
       usable = usable && factor->Evaluate(blocks.data(), residual.data(), nullptr);
       factors.emplace_back(std::move(factor), o->keyframe);
@@ -121,9 +121,9 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
   // Tracks of seconds leave few zeros between the states of a short recording, and dense Cholesky has less to keep
   // books of.
   constexpr std::size_t kDenseUpTo = 3000;
-  const bool dense = input_.config.solver == LinearSolver::kDenseSchur ||
-                     (input_.config.solver == LinearSolver::kAutomatic &&
-                      states_.size() * core::kStateDof <= kDenseUpTo);
+  const bool dense =
+      input_.config.solver == LinearSolver::kDenseSchur ||
+      (input_.config.solver == LinearSolver::kAutomatic && states_.size() * core::kStateDof <= kDenseUpTo);
   ceres_options.linear_solver_type = dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   ceres_options.dense_linear_algebra_library_type = ceres::LAPACK;
   ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
@@ -146,9 +146,14 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
 
   Outcome outcome;
   switch (ceres_summary.termination_type) {
-    case ceres::CONVERGENCE: outcome.status = core::SolveStatus::kConverged; break;
-    case ceres::NO_CONVERGENCE: outcome.status = core::SolveStatus::kIterationLimit; break;
-    default: outcome.status = core::SolveStatus::kDiverged;
+    case ceres::CONVERGENCE:
+      outcome.status = core::SolveStatus::kConverged;
+      break;
+    case ceres::NO_CONVERGENCE:
+      outcome.status = core::SolveStatus::kIterationLimit;
+      break;
+    default:
+      outcome.status = core::SolveStatus::kDiverged;
   }
   outcome.summary = {.iterations = static_cast<int>(ceres_summary.iterations.size()) - 1,
                      .initial_cost = ceres_summary.initial_cost,

@@ -26,7 +26,8 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.choice("residual", c.residual, kResidualTypeNames, "of a point; `pinhole`: pixels");
   v.choice("landmark", c.landmark, kLandmarkTypeNames, "`bearing_inverse_depth`: 3 dof, bearing and inverse depth");
   v.choice("initialisation", c.initialisation, kInitialisationNames, "`prior`: starts from the scenario's prior");
-  v.choice("solver", c.solver, kLinearSolverNames, "of Ceres, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
+  v.choice("solver", c.solver, kLinearSolverNames,
+           "of Ceres, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
   v.value("keyframe_rate_hz", c.keyframe_rate_hz, positive(), "only keyframes' observations enter");
   v.value("pixel_sigma_px", c.pixel_sigma_px, positive(), "scenario", "pixel noise it believes in");
   v.section("imu", c.imu, "IMU noise it believes in; must be given where the scenario's is 0");

@@ -36,7 +36,8 @@ core::EstimateLog estimate(const core::MeasurementLog& log, const EstimatorConfi
   require_usable(believed_noise(config, log.imu_noise, log.pixel_sigma_px), log.prior.calibration_sigma,
                  config.estimate);
   switch (config.type) {
-    case EstimatorType::kBatch: return estimate_batch(log, config);
+    case EstimatorType::kBatch:
+      return estimate_batch(log, config);
   }
   throw std::logic_error("estimate: unknown type");
 }

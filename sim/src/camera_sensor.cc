@@ -31,9 +31,7 @@ FrameView::FrameView(const Trajectory& trajectory, const core::PinholeCamera& ca
   cos_half_angle_ = std::cos(std::min(half_angle, std::numbers::pi));
 }
 
-core::Pose FrameView::camera_pose_at(double t_imu_s) const {
-  return trajectory_.pose_at(t_imu_s) * calibration_.T_B_C;
-}
+core::Pose FrameView::camera_pose_at(double t_imu_s) const { return trajectory_.pose_at(t_imu_s) * calibration_.T_B_C; }
 
 bool FrameView::may_see(const Eigen::Vector3d& P_W, double nearest_m, double farthest_m) const {
   const Eigen::Vector3d P_C = T_C_W_middle_ * P_W;

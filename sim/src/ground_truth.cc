@@ -15,7 +15,8 @@ core::State state_at(const GroundTruth& truth, core::TimeNs t_ns) {
   if (after != states.end() && after->t_ns == t_ns) return after->state;
   if (after == states.end() || after == states.begin()) {
     throw core::DataError(fmt::format("no truth at {} ns: it spans [{}, {}] ns", t_ns,
-                                      states.empty() ? 0 : states.front().t_ns, states.empty() ? 0 : states.back().t_ns));
+                                      states.empty() ? 0 : states.front().t_ns,
+                                      states.empty() ? 0 : states.back().t_ns));
   }
   const core::StampedState& a = *(after - 1);
   const core::StampedState& b = *after;

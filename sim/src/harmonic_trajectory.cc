@@ -65,8 +65,8 @@ Kinematics HarmonicTrajectory::at(double t_s) const {
   const double cp = std::cos(pitch[0]);
   const double sr = std::sin(roll[0]);
   const double cr = std::cos(roll[0]);
-  const Eigen::Vector3d omega(roll[1] - yaw[1] * sp,              //
-                              pitch[1] * cr + yaw[1] * sr * cp,   //
+  const Eigen::Vector3d omega(roll[1] - yaw[1] * sp,             //
+                              pitch[1] * cr + yaw[1] * sr * cp,  //
                               -pitch[1] * sr + yaw[1] * cr * cp);
   const Eigen::Vector3d alpha(
       roll[2] - yaw[2] * sp - yaw[1] * cp * pitch[1],
@@ -97,9 +97,8 @@ HarmonicTrajectory::Shape handheld_shape(const HandheldConfig& config, core::Tri
     for (int k = 0; k < kTerms; ++k) {
       const auto u = stream.uniforms(index, static_cast<std::uint64_t>(k));
       const double omega = kTwoPi * config.lowest_frequency_hz * std::pow(ratio, (k + u[0]) / kTerms);
-      sum.terms.push_back({.amplitude = rate_rms * std::sqrt(2.0 / kTerms) / omega,
-                           .omega_rad_s = omega,
-                           .phase_rad = kTwoPi * u[1]});
+      sum.terms.push_back(
+          {.amplitude = rate_rms * std::sqrt(2.0 / kTerms) / omega, .omega_rad_s = omega, .phase_rad = kTwoPi * u[1]});
     }
     return sum;
   };

@@ -4,8 +4,8 @@
 
 namespace plumbline::sim {
 
-ImuRecording simulate_imu(const Trajectory& trajectory, const ImuConfig& config, double gravity_m_s2,
-                          double duration_s, core::TrialId id) {
+ImuRecording simulate_imu(const Trajectory& trajectory, const ImuConfig& config, double gravity_m_s2, double duration_s,
+                          core::TrialId id) {
   const core::RandomStream gyro_white(id, "imu0/gyro_white");
   const core::RandomStream accel_white(id, "imu0/accel_white");
   const core::RandomStream gyro_walk(id, "imu0/gyro_walk");

@@ -13,7 +13,8 @@ using core::probability;
 // Argument-dependent lookup finds these; it does not look into an unnamed namespace.
 static void visit(core::ConfigVisitor& v, HandheldConfig& c) {
   v.value("speed_rms_m_s", c.speed_rms_m_s, non_negative(), "root mean square speed");
-  v.value("rate_rms_rad_s", c.rate_rms_rad_s, non_negative(), "root mean square angular rate; the peak is about 2.2 times");
+  v.value("rate_rms_rad_s", c.rate_rms_rad_s, non_negative(),
+          "root mean square angular rate; the peak is about 2.2 times");
   v.value("lowest_frequency_hz", c.lowest_frequency_hz, positive(), "lower end of the band of its sinusoids");
   v.value("highest_frequency_hz", c.highest_frequency_hz, positive(), "upper end");
 }
@@ -37,7 +38,8 @@ static void visit(core::ConfigVisitor& v, TrajectoryConfig& c) {
 
 static void visit(core::ConfigVisitor& v, ImuConfig& c) {
   v.value("rate_hz", c.rate_hz, core::between(10.0, 10000.0), "samples a second");
-  v.value("gyro_noise_density_rad_s_sqrt_hz", c.noise.gyro_noise_density, non_negative(), "white noise, continuous time");
+  v.value("gyro_noise_density_rad_s_sqrt_hz", c.noise.gyro_noise_density, non_negative(),
+          "white noise, continuous time");
   v.value("gyro_bias_walk_rad_s2_sqrt_hz", c.noise.gyro_bias_walk, non_negative(), "random walk of the bias");
   v.value("accel_noise_density_m_s2_sqrt_hz", c.noise.accel_noise_density, non_negative(),
           "white noise, continuous time");
@@ -79,7 +81,8 @@ static void visit(core::ConfigVisitor& v, PointsConfig& c) {
 }
 
 static void visit(core::ConfigVisitor& v, PriorConfig& c) {
-  v.choice("means", c.means, kPriorMeansNames, "`drawn`: truth plus noise of the sigmas below; `truth`: exact, and no NEES is reported");
+  v.choice("means", c.means, kPriorMeansNames,
+           "`drawn`: truth plus noise of the sigmas below; `truth`: exact, and no NEES is reported");
   v.choice("start", c.start, kPriorStartNames, "where the iteration starts: at the means, or at a draw of its own");
   v.value("td_mean_s", c.td_mean_s, core::between(-1.0, 1.0), "drawn",
           "td of the middle row; with a fixed value no NEES of td is reported");

@@ -14,11 +14,12 @@ std::unique_ptr<const Trajectory> make_trajectory(const TrajectoryConfig& config
   switch (config.type) {
     case TrajectoryType::kHandheld:
       return std::make_unique<HarmonicTrajectory>(handheld_shape(config.handheld, id));
-    case TrajectoryType::kFigureEight: return std::make_unique<HarmonicTrajectory>(figure_eight_shape(config.loop));
-    case TrajectoryType::kCircle: return std::make_unique<HarmonicTrajectory>(circle_shape(config.loop));
+    case TrajectoryType::kFigureEight:
+      return std::make_unique<HarmonicTrajectory>(figure_eight_shape(config.loop));
+    case TrajectoryType::kCircle:
+      return std::make_unique<HarmonicTrajectory>(circle_shape(config.loop));
     case TrajectoryType::kSpline:
-      return std::make_unique<SplineTrajectory>(
-          fit_spline(core::read_tum(config.file), config, duration_s).trajectory);
+      return std::make_unique<SplineTrajectory>(fit_spline(core::read_tum(config.file), config, duration_s).trajectory);
   }
   throw std::logic_error("make_trajectory: unknown type");
 }

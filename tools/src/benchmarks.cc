@@ -77,8 +77,8 @@ void propagated_point(benchmark::State& state) {
   const double readout = s.truth.calibration.readout_s;
   Eigen::Vector3d landmark = log.camera.unproject(seen_i.pixel);
   landmark.z() = 0.2;
-  const std::array<const double*, 6> parameters = {state_i.data(), state_j.data(), extrinsics.data(),
-                                                   &td,            &readout,       landmark.data()};
+  const std::array<const double*, 6> parameters = {state_i.data(), state_j.data(), extrinsics.data(), &td,
+                                                   &readout,       landmark.data()};
   std::array<double, 2 * kStateSize> J_i{};
   std::array<double, 2 * kStateSize> J_j{};
   std::array<double, 2 * kPoseSize> J_extrinsics{};
@@ -89,7 +89,8 @@ void propagated_point(benchmark::State& state) {
                                       J_td.data(), J_readout.data(), J_landmark.data()};
   Eigen::Vector2d residual;
   for (auto _ : state) {
-    const bool ok = factor.Evaluate(parameters.data(), residual.data(), state.range(0) != 0 ? jacobians.data() : nullptr);
+    const bool ok =
+        factor.Evaluate(parameters.data(), residual.data(), state.range(0) != 0 ? jacobians.data() : nullptr);
     if (!ok) state.SkipWithError("the landmark is not seen");
     benchmark::DoNotOptimize(residual);
   }

@@ -75,8 +75,7 @@ int simulate(const SimulateOptions& options) {
   const sim::ScenarioConfig scenario = load_scenario(options.scenario, options.set);
   const core::TrialId id{options.seed, options.trial};
   const sim::Simulation simulation = sim::simulate(scenario, id);
-  const std::string hash =
-      core::content_hash(core::resolved_config(scenario, core::PathForm::kContentHash).dump());
+  const std::string hash = core::content_hash(core::resolved_config(scenario, core::PathForm::kContentHash).dump());
   write_simulation(options.out, simulation, {.config_hash = hash, .seed = id.seed, .trial = id.trial});
 
   const auto trajectory = sim::make_trajectory(scenario.trajectory, scenario.duration_s, id);
@@ -195,8 +194,8 @@ int replay(const ReplayOptions& options) {
       return kExitWorse;
     }
   }
-  throw core::DataError(fmt::format("{}: no run with id '{}'", (options.results / "manifest.json").generic_string(),
-                                    options.run_id));
+  throw core::DataError(
+      fmt::format("{}: no run with id '{}'", (options.results / "manifest.json").generic_string(), options.run_id));
 }
 
 int check(const CheckOptions& options) {

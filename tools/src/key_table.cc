@@ -27,10 +27,9 @@ std::string key_table() {
       sections.push_back(key);
       continue;
     }
-    rows[key.key.substr(0, key.key.rfind('.'))] +=
-        fmt::format("| `{}` | {} | {} | {} | {} |\n", key.key, cell(key.type),
-                    key.default_value.empty() ? "" : fmt::format("`{}`", key.default_value), cell(key.rule),
-                    cell(key.doc));
+    rows[key.key.substr(0, key.key.rfind('.'))] += fmt::format(
+        "| `{}` | {} | {} | {} | {} |\n", key.key, cell(key.type),
+        key.default_value.empty() ? "" : fmt::format("`{}`", key.default_value), cell(key.rule), cell(key.doc));
   }
   std::string table;
   for (const core::KeyDoc& section : sections) {

@@ -31,7 +31,9 @@ int parse_and_run(int argc, char** argv) {
   app.set_version_flag("--version", fmt::format("plumbline {} ({})", version(), commit()));
   app.require_subcommand(1);
   const auto add_set = [](CLI::App* command, std::vector<std::string>& set) {
-    command->add_option("--set", set, "override a key, as in scenario.camera.td_s=0.02")->type_name("KEY=VALUE")->allow_extra_args(false);
+    command->add_option("--set", set, "override a key, as in scenario.camera.td_s=0.02")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
   };
 
   RunOptions run_options;

@@ -60,9 +60,8 @@ Finished run_one(const Plan& plan, int index) {
 // Mean CPU seconds a trial.
 ordered_json runtime_summary(const TrialTimings& sum, int n) {
   const double per = n > 0 ? 1.0 / n : 0.0;
-  return {{"simulate_s", sum.simulate_s * per},
-          {"estimate_s", sum.estimate_s * per},
-          {"evaluate_s", sum.evaluate_s * per}};
+  return {
+      {"simulate_s", sum.simulate_s * per}, {"estimate_s", sum.estimate_s * per}, {"evaluate_s", sum.evaluate_s * per}};
 }
 
 // A folder may hold results of the same configuration with at most as many trials; all else would be lost.
@@ -75,14 +74,13 @@ void refuse_to_lose(const std::filesystem::path& out, const Plan& plan, bool fre
   const ordered_json old = ordered_json::parse(std::ifstream(manifest), nullptr, false);
   const bool same = old.is_object() && old.value("config_hash", "") == plan.config_hash;
   if (!same) {
-    throw core::DataError(fmt::format(
-        "{}: holds results of another configuration; choose another --out, or discard them with --fresh",
-        out.generic_string()));
+    throw core::DataError(
+        fmt::format("{}: holds results of another configuration; choose another --out, or discard them with --fresh",
+                    out.generic_string()));
   }
   if (old.contains("experiment") && old["experiment"].value("trials", 0) > plan.base.experiment.trials) {
-    throw core::DataError(
-        fmt::format("{}: holds results of more trials; ask for as many, or discard them with --fresh",
-                    out.generic_string()));
+    throw core::DataError(fmt::format("{}: holds results of more trials; ask for as many, or discard them with --fresh",
+                                      out.generic_string()));
   }
 }
 
@@ -115,8 +113,7 @@ int run(const RunOptions& options) {
   std::vector<std::string> overrides = options.set;
   if (options.trials) overrides.push_back(fmt::format("experiment.trials={}", *options.trials));
   const Plan plan = load_plan(options.experiment, overrides);
-  const std::filesystem::path out =
-      options.out.value_or(std::filesystem::path("out") / plan.base.experiment.name);
+  const std::filesystem::path out = options.out.value_or(std::filesystem::path("out") / plan.base.experiment.name);
   refuse_to_lose(out, plan, options.fresh);
   std::filesystem::create_directories(out);
   if (options.fresh) std::filesystem::remove_all(out / "series");
@@ -168,8 +165,8 @@ int run(const RunOptions& options) {
         .incident =
             [&](int index) {
               ++incidents;
-              incidents_file << ordered_json{{"run_id", identity(plan, index).run_id}, {"cause", "out of memory"}}.dump()
-                             << '\n';
+              incidents_file
+                  << ordered_json{{"run_id", identity(plan, index).run_id}, {"cause", "out of memory"}}.dump() << '\n';
               progress.add(false);
             }};
     done = eval::run_trials<Finished>(

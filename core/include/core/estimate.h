@@ -21,8 +21,8 @@ enum class SolveStatus {
   kFalseMinimum,          // converged where the residuals are far larger than their noise
   kFailedInitialisation,  // too little data, or no starting point in front of the camera
 };
-inline constexpr std::array<std::string_view, 5> kSolveStatusNames = {
-    "converged", "iteration_limit", "diverged", "false_minimum", "failed_initialisation"};
+inline constexpr std::array<std::string_view, 5> kSolveStatusNames = {"converged", "iteration_limit", "diverged",
+                                                                      "false_minimum", "failed_initialisation"};
 
 struct StampedState {
   TimeNs t_ns = 0;  // IMU clock

@@ -63,10 +63,9 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
     J.block<3, 3>(kPosition, kVelocity) = -dt * R_i_T;
     J.block<3, 3>(kPosition, kGyroBias) = -x.p_bg;
     J.block<3, 3>(kPosition, kAccelBias) = -x.p_ba;
-    J.block<3, 3>(kOrientation, kOrientation) =
-        -Jr_inv * (j.T_W_B.q.conjugate() * i.T_W_B.q).toRotationMatrix();
-    J.block<3, 3>(kOrientation, kGyroBias) = -Jr_inv * core::exp_so3(r_theta).transpose() *
-                                             core::right_jacobian(increment.rotation_correction) * x.R_bg;
+    J.block<3, 3>(kOrientation, kOrientation) = -Jr_inv * (j.T_W_B.q.conjugate() * i.T_W_B.q).toRotationMatrix();
+    J.block<3, 3>(kOrientation, kGyroBias) =
+        -Jr_inv * core::exp_so3(r_theta).transpose() * core::right_jacobian(increment.rotation_correction) * x.R_bg;
     J.block<3, 3>(kVelocity, kOrientation) = core::skew(dv);
     J.block<3, 3>(kVelocity, kVelocity) = -R_i_T;
     J.block<3, 3>(kVelocity, kGyroBias) = -x.v_bg;

@@ -22,8 +22,8 @@ using core::kVelocity;
 void apply_transition(const ImuStep& step, StateMatrix& X) {
   using Rows = Eigen::Matrix<double, 3, core::kStateDof>;
   const Rows theta = step.dR_T * X.middleRows<3>(kOrientation) - step.Jr_dt * X.middleRows<3>(kGyroBias);
-  const Rows a = -step.half0 * X.middleRows<3>(kOrientation) - step.half1 * theta -
-                 step.mean_R * X.middleRows<3>(kAccelBias);
+  const Rows a =
+      -step.half0 * X.middleRows<3>(kOrientation) - step.half1 * theta - step.mean_R * X.middleRows<3>(kAccelBias);
   X.middleRows<3>(kPosition) += step.dt * X.middleRows<3>(kVelocity) + 0.5 * step.dt * step.dt * a;
   X.middleRows<3>(kVelocity) += step.dt * a;
   X.middleRows<3>(kOrientation) = theta;

@@ -14,10 +14,10 @@
 namespace plumbline::sim {
 
 struct GroundTruth {
-  core::RigCalibration calibration;             // td of the middle row
-  std::vector<core::StampedState> states;       // at every IMU sample, IMU clock, sorted; biases as drawn
-  std::vector<Eigen::Vector3d> landmarks_W;     // [m]
-  std::map<std::int64_t, int> track_landmark;   // the landmark that a track sees
+  core::RigCalibration calibration;            // td of the middle row
+  std::vector<core::StampedState> states;      // at every IMU sample, IMU clock, sorted; biases as drawn
+  std::vector<Eigen::Vector3d> landmarks_W;    // [m]
+  std::map<std::int64_t, int> track_landmark;  // the landmark that a track sees
 };
 
 // The true state at an IMU clock time within the recording: exact at the stamp of an IMU sample, else interpolated

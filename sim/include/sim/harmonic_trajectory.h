@@ -28,11 +28,11 @@ struct SinusoidSum {
 class HarmonicTrajectory final : public Trajectory {
  public:
   struct Shape {
-    std::array<SinusoidSum, 3> position;   // x, y, z
-    SinusoidSum yaw;                       // unused where the yaw follows the path
-    SinusoidSum pitch;                     // stays away from +-90 degrees
+    std::array<SinusoidSum, 3> position;  // x, y, z
+    SinusoidSum yaw;                      // unused where the yaw follows the path
+    SinusoidSum pitch;                    // stays away from +-90 degrees
     SinusoidSum roll;
-    bool yaw_follows_path = false;         // needs a horizontal velocity that never vanishes
+    bool yaw_follows_path = false;  // needs a horizontal velocity that never vanishes
   };
 
   explicit HarmonicTrajectory(Shape shape) : shape_(std::move(shape)) {}

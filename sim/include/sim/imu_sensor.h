@@ -17,7 +17,7 @@ struct ImuRecording {
 };
 
 // Samples at 0, dt, 2 dt, ... up to duration_s.
-ImuRecording simulate_imu(const Trajectory& trajectory, const ImuConfig& config, double gravity_m_s2,
-                          double duration_s, core::TrialId id);
+ImuRecording simulate_imu(const Trajectory& trajectory, const ImuConfig& config, double gravity_m_s2, double duration_s,
+                          core::TrialId id);
 
 }  // namespace plumbline::sim

@@ -37,11 +37,11 @@ struct LoopConfig {
 struct TrajectoryConfig {
   TrajectoryType type = TrajectoryType::kHandheld;
   HandheldConfig handheld;
-  LoopConfig loop;                   // circle and figure_eight
-  std::filesystem::path file;        // spline: poses T_W_B in TUM format
-  double start_s = 0.0;              // spline: into the file
-  double knot_interval_s = 0.1;      // spline: wider smooths more
-  double largest_gap_s = 0.2;        // spline: a wider gap between poses is refused
+  LoopConfig loop;               // circle and figure_eight
+  std::filesystem::path file;    // spline: poses T_W_B in TUM format
+  double start_s = 0.0;          // spline: into the file
+  double knot_interval_s = 0.1;  // spline: wider smooths more
+  double largest_gap_s = 0.2;    // spline: a wider gap between poses is refused
 };
 
 struct ImuConfig {
@@ -58,8 +58,8 @@ struct CameraConfig {
   core::RowReference td_reference_row = core::RowReference::kMiddle;
   double readout_s = 0.0;
   double pixel_sigma_px = 1.0;
-  Eigen::Vector3d extrinsic_position_m{0.06, 0.02, -0.01};          // p_B_C
-  Eigen::Vector4d extrinsic_rotation_xyzw{-0.5, 0.5, -0.5, 0.5};    // R_B_C: the camera looks along the body's x
+  Eigen::Vector3d extrinsic_position_m{0.06, 0.02, -0.01};        // p_B_C
+  Eigen::Vector4d extrinsic_rotation_xyzw{-0.5, 0.5, -0.5, 0.5};  // R_B_C: the camera looks along the body's x
 };
 
 enum class WorldType { kShell };
