@@ -275,6 +275,15 @@ TEST_F(Dataset, IsNeverWrittenOver) {
   expect_same(core::read_dataset(empty), simulation_.measurements);
 }
 
+TEST_F(Dataset, RefusesFilesThatWereCutShort) {
+  for (const char* file : {"prior.yaml", "meta.yaml", "mav0/imu0/sensor.yaml", "mav0/cam0/sensor.yaml"}) {
+    const std::string original = text(file);
+    rewrite(file, original.substr(0, original.rfind('\n', original.size() - 2) + 1));  // without its last line
+    EXPECT_THAT(refusal(), testing::AllOf(HasSubstr(file), HasSubstr("is missing"))) << file;
+    rewrite(file, original);
+  }
+}
+
 TEST_F(Dataset, AcceptsCarriageReturns) {
   for (const char* file : {kImu, kFrames, kPoints}) {
     std::string crlf;

@@ -132,10 +132,21 @@ void write_yaml(const std::filesystem::path& file, const Config& config) {
   write_file_atomically(file, to_yaml(resolved_config(config)));
 }
 
+// A dataset states everything: a key that is missing is a file cut short, not a default.
+void require_keys(const ConfigTree& tree, const nlohmann::ordered_json& resolved, const std::string& prefix) {
+  for (const auto& [key, value] : resolved.items()) {
+    const std::string dotted = prefix.empty() ? key : prefix + "." + key;
+    if (find_value(tree, dotted) == nullptr) throw config_error(tree.origin, dotted, "is missing");
+    if (value.is_object()) require_keys(tree, value, dotted);
+  }
+}
+
 template <class Config>
 Config read_yaml(const std::filesystem::path& file) {
   Config config;
-  read_config(load_config_file(file), "", config);
+  const ConfigTree tree = load_config_file(file);
+  read_config(tree, "", config);
+  require_keys(tree, resolved_config(config), "");
   return config;
 }
 

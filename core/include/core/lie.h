@@ -108,15 +108,16 @@ inline Eigen::Vector3d right_jacobian_times(const Eigen::Vector3d& theta, const 
   return x - a * c + b * theta.cross(c);
 }
 
-// Inverse of the right Jacobian (Sola eq. 144); |theta| < 2 pi.
+// Inverse of the right Jacobian (Sola eq. 144); |theta| < 2 pi. Its coefficient 1/angle^2 - (1 + cos)/(2 angle sin) is
+// written with the half angle, since 1 + cos and sin both vanish at pi.
 inline Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& theta) {
   const double angle2 = theta.squaredNorm();
   double b;
   if (angle2 < detail::kSmallAngleSquared) {
     b = 1.0 / 12.0 + angle2 / 720.0 * (1.0 + angle2 / 42.0 * (1.0 + angle2 / 40.0));
   } else {
-    const double angle = std::sqrt(angle2);
-    b = 1.0 / angle2 - (1.0 + std::cos(angle)) / (2.0 * angle * std::sin(angle));
+    const double half = 0.5 * std::sqrt(angle2);
+    b = (1.0 - half / std::tan(half)) / angle2;
   }
   const Eigen::Matrix3d S = skew(theta);
   return Eigen::Matrix3d::Identity() + 0.5 * S + b * S * S;

@@ -30,7 +30,7 @@ struct Frame {
 };
 
 // What is known before the first image: itself a measurement, drawn about the truth. The state is that of the IMU
-// sample at t_ns. Sigmas are of the perturbations of docs/conventions.md; 0 means exactly known.
+// sample at t_ns. Sigmas are of the perturbations of docs/conventions.md; in the calibration 0 means exactly known.
 struct InitialPrior {
   TimeNs t_ns = 0;  // IMU clock, the stamp of an IMU sample
   State mean;
