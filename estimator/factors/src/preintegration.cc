@@ -29,6 +29,21 @@ void apply_transition(const ImuStep& step, StateMatrix& X) {
   X.middleRows<3>(kOrientation) = theta;
 }
 
+// v' and p' get dt a and dt^2/2 a, where a has the covariance a_cov and the orientation's noise theta_a_cov with it.
+void add_noise_of_acceleration(double dt, const Eigen::Matrix3d& a_cov, const Eigen::Matrix3d& theta_a_cov,
+                               StateMatrix& P) {
+  const double to_v = dt;
+  const double to_p = 0.5 * dt * dt;
+  P.block<3, 3>(kVelocity, kVelocity) += to_v * to_v * a_cov;
+  P.block<3, 3>(kPosition, kPosition) += to_p * to_p * a_cov;
+  P.block<3, 3>(kPosition, kVelocity) += to_p * to_v * a_cov;
+  P.block<3, 3>(kVelocity, kPosition) += to_p * to_v * a_cov;
+  P.block<3, 3>(kOrientation, kVelocity) += to_v * theta_a_cov;
+  P.block<3, 3>(kVelocity, kOrientation) += to_v * theta_a_cov.transpose();
+  P.block<3, 3>(kOrientation, kPosition) += to_p * theta_a_cov;
+  P.block<3, 3>(kPosition, kOrientation) += to_p * theta_a_cov.transpose();
+}
+
 }  // namespace
 
 Preintegration preintegrate(std::span<const core::ImuSample> samples, const core::ImuBias& bias,
@@ -54,16 +69,12 @@ Preintegration preintegrate(std::span<const core::ImuSample> samples, const core
     P.transposeInPlace();
     apply_transition(step, P);
     // One noise of variance sigma^2/dt a step: theta' gets -Jr dt n_g, a gets R1 [f1]x/2 Jr dt n_g - (R0 + R1)/2 n_a.
-    Eigen::Matrix<double, 9, 6> G;
-    G.block<3, 3>(kOrientation, 0) = -step.Jr_dt;
-    G.block<3, 3>(kVelocity, 0) = dt * step.half1 * step.Jr_dt;
-    G.block<3, 3>(kPosition, 0) = 0.5 * dt * G.block<3, 3>(kVelocity, 0);
-    G.block<3, 3>(kOrientation, 3).setZero();
-    G.block<3, 3>(kVelocity, 3) = -dt * step.mean_R;
-    G.block<3, 3>(kPosition, 3) = 0.5 * dt * G.block<3, 3>(kVelocity, 3);
-    Eigen::Matrix<double, 6, 1> variance;
-    variance << Eigen::Vector3d::Constant(gyro2 / dt), Eigen::Vector3d::Constant(accel2 / dt);
-    P.topLeftCorner<9, 9>() += G * variance.asDiagonal() * G.transpose();
+    const Eigen::Matrix3d a_ng = step.half1 * step.Jr_dt;
+    const Eigen::Matrix3d a_cov =
+        (gyro2 / dt) * (a_ng * a_ng.transpose()) + (accel2 / dt) * (step.mean_R * step.mean_R.transpose());
+    const Eigen::Matrix3d theta_a_cov = (-gyro2 / dt) * (step.Jr_dt * a_ng.transpose());
+    P.block<3, 3>(kOrientation, kOrientation) += (gyro2 / dt) * (step.Jr_dt * step.Jr_dt.transpose());
+    add_noise_of_acceleration(dt, a_cov, theta_a_cov, P);
     P.diagonal().segment<3>(kGyroBias).array() += gyro_walk2 * dt;
     P.diagonal().segment<3>(kAccelBias).array() += accel_walk2 * dt;
   }
