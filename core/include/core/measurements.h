@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -22,6 +23,8 @@ struct ImuSample {
 struct PointObservation {
   std::int64_t track_id = 0;  // one number a track; a landmark that is lost and found again gets a new one
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  // Of the normalised coordinates (x, y), 1/s; absent where none is known.
+  std::optional<Eigen::Vector2d> velocity = std::nullopt;
 };
 
 struct Frame {

@@ -1,0 +1,40 @@
+// The keys of scenario.camera and scenario.points: the camera, how it is mounted, and what it tracks.
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "core/calibration.h"
+#include "core/camera.h"
+#include "core/config.h"
+#include "core/error.h"
+
+namespace plumbline::sim {
+
+struct CameraConfig {
+  double rate_hz = 20.0;
+  core::PinholeCamera model;
+  double td_s = 0.0;
+  core::RowReference td_reference_row = core::RowReference::kMiddle;
+  double readout_s = 0.0;
+  double pixel_sigma_px = 1.0;
+  Eigen::Vector3d extrinsic_position_m{0.06, 0.02, -0.01};        // p_B_C
+  Eigen::Vector4d extrinsic_rotation_xyzw{-0.5, 0.5, -0.5, 0.5};  // R_B_C: the camera looks along the body's x
+};
+
+void visit(core::ConfigVisitor& v, CameraConfig& c);
+std::optional<core::RuleViolation> validate(const CameraConfig& c);
+
+struct PointsConfig {
+  int per_frame = 100;
+  double nearest_m = 0.5;
+  double farthest_m = 15.0;
+  double loss_probability = 0.0;
+  int longest_track_frames = 0;
+};
+
+void visit(core::ConfigVisitor& v, PointsConfig& c);
+std::optional<core::RuleViolation> validate(const PointsConfig& c);
+
+}  // namespace plumbline::sim
