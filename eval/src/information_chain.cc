@@ -1,0 +1,163 @@
+#include "eval/information_chain.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <unordered_map>
+
+namespace plumbline::eval {
+namespace {
+
+Eigen::LLT<Eigen::MatrixXd> factorised(const Eigen::MatrixXd& H) {
+  Eigen::LLT<Eigen::MatrixXd> llt(H);
+  if (llt.info() != Eigen::Success) throw std::domain_error("the information is singular");
+  return llt;
+}
+
+}  // namespace
+
+InformationChain::Variable InformationChain::add(int dof) {
+  const Variable v = size();
+  dofs_.push_back(dof);
+  offsets_.push_back(total_dof_);
+  total_dof_ += dof;
+  const auto n = H_.rows();
+  active_.push_back(v);
+  active_offsets_.push_back(static_cast<int>(n));
+  H_.conservativeResizeLike(Eigen::MatrixXd::Zero(n + dof, n + dof));
+  return v;
+}
+
+std::vector<int> InformationChain::columns_of(const std::vector<Variable>& variables) const {
+  std::vector<int> columns;
+  for (const Variable v : variables) {
+    const int first = active_offsets_[static_cast<std::size_t>(v)];
+    if (first < 0) throw std::invalid_argument("InformationChain: the variable was eliminated");
+    for (int i = 0; i < dof(v); ++i) columns.push_back(first + i);
+  }
+  return columns;
+}
+
+std::vector<int> InformationChain::rows_of(const std::vector<Variable>& variables) const {
+  std::vector<int> rows;
+  for (const Variable v : variables) {
+    for (int i = 0; i < dof(v); ++i) rows.push_back(offset(v) + i);
+  }
+  return rows;
+}
+
+void InformationChain::observe(const std::vector<Variable>& variables, const Eigen::MatrixXd& J) {
+  const std::vector<int> columns = columns_of(variables);
+  if (static_cast<Eigen::Index>(columns.size()) != J.cols()) {
+    throw std::invalid_argument("InformationChain: columns and variables do not match");
+  }
+  const Eigen::MatrixXd JtJ = J.transpose() * J;
+  for (Eigen::Index c = 0; c < JtJ.cols(); ++c) {
+    for (Eigen::Index r = 0; r < JtJ.rows(); ++r) {
+      H_(columns[static_cast<std::size_t>(r)], columns[static_cast<std::size_t>(c)]) += JtJ(r, c);
+    }
+  }
+}
+
+void InformationChain::reindex() {
+  std::fill(active_offsets_.begin(), active_offsets_.end(), -1);
+  int next = 0;
+  for (const Variable v : active_) {
+    active_offsets_[static_cast<std::size_t>(v)] = next;
+    next += dof(v);
+  }
+}
+
+void InformationChain::eliminate(const std::vector<Variable>& variables) {
+  if (variables.empty()) return;
+  const std::vector<int> F = columns_of(variables);
+  Conditional conditional;
+  conditional.frontal = variables;
+  for (const Variable v : active_) {
+    if (std::find(variables.begin(), variables.end(), v) == variables.end()) conditional.separator.push_back(v);
+  }
+  const std::vector<int> S = columns_of(conditional.separator);
+  conditional.H_FF = factorised(H_(F, F));
+  const Eigen::MatrixXd H_FS = H_(F, S);
+  conditional.A = conditional.H_FF.solve(H_FS);
+  // H_SF H_FF^-1 H_FS as a square, so that rounding leaves it symmetric.
+  const Eigen::MatrixXd root = conditional.H_FF.matrixL().solve(H_FS);
+  Eigen::MatrixXd reduced = H_(S, S);
+  reduced.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose(), -1.0);
+  reduced.triangularView<Eigen::StrictlyUpper>() = reduced.transpose();
+  H_ = std::move(reduced);
+  active_ = conditional.separator;
+  reindex();
+  conditionals_.push_back(std::move(conditional));
+}
+
+Eigen::MatrixXd InformationChain::causal_covariance(const std::vector<Variable>& variables,
+                                                    const std::vector<Variable>& weak) const {
+  const std::vector<int> columns = columns_of(variables);
+  Eigen::MatrixXd H = H_;
+  for (const int i : columns_of(weak)) H(i, i) += kWeak;
+  const auto llt = factorised(H);
+  Eigen::MatrixXd selected = Eigen::MatrixXd::Zero(H_.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t i = 0; i < columns.size(); ++i) selected(columns[i], static_cast<Eigen::Index>(i)) = 1.0;
+  // Sigma = L^-T L^-1: the square of half a substitution.
+  llt.matrixL().solveInPlace(selected);
+  return selected.transpose() * selected;
+}
+
+void InformationChain::finish() {
+  const std::vector<Variable> rest = active_;
+  eliminate(rest);
+}
+
+std::vector<Eigen::MatrixXd> InformationChain::marginals() const {
+  if (!active_.empty()) throw std::logic_error("InformationChain: finish() first");
+  std::vector<Eigen::MatrixXd> result(dofs_.size());
+  std::unordered_map<Variable, int> place;  // of a variable in Sigma
+  Eigen::MatrixXd Sigma;
+  for (auto c = conditionals_.rbegin(); c != conditionals_.rend(); ++c) {
+    std::vector<int> S;
+    for (const Variable v : c->separator) {
+      for (int i = 0; i < dof(v); ++i) S.push_back(place.at(v) + i);
+    }
+    const Eigen::MatrixXd Sigma_SS = Sigma(S, S);
+    const auto f = c->A.rows();
+    const auto s = c->A.cols();
+    Eigen::MatrixXd next(f + s, f + s);
+    const Eigen::MatrixXd ASigma = c->A * Sigma_SS;
+    const Eigen::MatrixXd own = c->H_FF.matrixL().solve(Eigen::MatrixXd::Identity(f, f));
+    next.topLeftCorner(f, f) = own.transpose() * own + ASigma * c->A.transpose();
+    next.topRightCorner(f, s) = -ASigma;
+    next.bottomLeftCorner(s, f) = -ASigma.transpose();
+    next.bottomRightCorner(s, s) = Sigma_SS;
+    Sigma = std::move(next);
+
+    place.clear();
+    int at = 0;
+    for (const Variable v : c->frontal) {
+      result[static_cast<std::size_t>(v)] = Sigma.block(at, at, dof(v), dof(v));
+      place[v] = at;
+      at += dof(v);
+    }
+    for (const Variable v : c->separator) {
+      place[v] = at;
+      at += dof(v);
+    }
+  }
+  return result;
+}
+
+Eigen::MatrixXd InformationChain::solve(const Eigen::MatrixXd& B) const {
+  if (!active_.empty()) throw std::logic_error("InformationChain: finish() first");
+  Eigen::MatrixXd x = B;
+  for (const Conditional& c : conditionals_) {
+    const Eigen::MatrixXd b_F = x(rows_of(c.frontal), Eigen::all);
+    x(rows_of(c.separator), Eigen::all) -= c.A.transpose() * b_F;
+  }
+  for (auto c = conditionals_.rbegin(); c != conditionals_.rend(); ++c) {
+    const Eigen::MatrixXd b_F = x(rows_of(c->frontal), Eigen::all);
+    const Eigen::MatrixXd x_S = x(rows_of(c->separator), Eigen::all);
+    x(rows_of(c->frontal), Eigen::all) = c->H_FF.solve(b_F) - c->A * x_S;
+  }
+  return x;
+}
+
+}  // namespace plumbline::eval
