@@ -3,6 +3,7 @@
 set(roots_core core/include)
 set(roots_sim core/include sim/include)
 set(roots_factors core/include estimator/factors/include)
+set(roots_eval core/include sim/include estimator/factors/include eval/include)
 set(roots_estimator core/include estimator/factors/include estimator/include)
 
 function(expect layer header compiles)
@@ -37,6 +38,8 @@ expect(factors estimator/batch.h FALSE)
 expect(estimator estimator/triangulation.h TRUE)
 expect(estimator sim/ground_truth.h FALSE)
 expect(estimator eval/alignment.h FALSE)
+expect(eval estimator/factors/imu_factor.h TRUE)
+expect(eval estimator/batch.h FALSE)
 
 # The roots above are those of the build: what the targets' compile commands name.
 file(STRINGS ${BINARY_DIR_TOP}/compile_commands.json commands REGEX "\"command\":")

@@ -1,0 +1,58 @@
+// The Cramer-Rao bound of a trial: no estimator that is locally unbiased, given these measurements and this prior, has
+// a smaller covariance than
+//   Sigma = ( P0^-1 + sum_i J_i^T J_i )^-1
+// J_i the whitened Jacobians of all inertial and visual measurements at the true states, with the exact camera timing
+// (`propagated`), landmarks with three degrees of freedom and no prior. Since priors are drawn as one more measurement,
+// this is the classical bound (Van Trees, 1968, section 2.4.2); the biases' walk is part of the measurement model.
+//
+// Landmarks are taken in world coordinates here, which any smooth choice of coordinates equals. Each track is a
+// landmark of its own, as to an estimator that does not recognise places. A direction in which no observation moves
+// a landmark (no parallax) is left out.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/estimate.h"
+#include "core/measurements.h"
+#include "eval/aligned_bound.h"
+#include "eval/alignment.h"
+#include "sim/ground_truth.h"
+
+namespace plumbline::eval {
+
+// From the measurements up to the stamp.
+struct CausalBound {
+  core::TimeNs t_ns = 0;  // of the state, IMU clock
+  core::PosteriorCovariance covariance = core::PosteriorCovariance::Zero();
+};
+
+struct CramerRaoBound {
+  // Of the calibration and the last state, in the order of core/estimate.h; rows of what is not free are zero.
+  core::PosteriorCovariance covariance = core::PosteriorCovariance::Zero();
+  std::vector<core::TimeNs> t_ns;     // of the states: the prior's and one a frame
+  std::vector<PoseCovariance> poses;  // likewise, from all measurements
+  AlignedBound ate;
+  std::vector<CausalBound> causal;  // one a frame, if asked for
+  // (sigma_g f)^2 |tau| M / sigma_px^2, mean over the observations: the share of the gyroscope's noise within the gap
+  // between a state and its observations, which the model neglects. The bound is trusted up to kLargestKappa2.
+  double kappa2 = 0.0;
+};
+
+inline constexpr double kLargestKappa2 = 0.05;
+
+struct BoundOptions {
+  std::vector<std::size_t> frames;  // those whose observations are used, indices into the log, increasing
+  bool td = true;                   // what is free
+  bool readout = true;
+  bool extrinsics = true;
+  Alignment alignment = Alignment::kPosyaw;  // by all poses
+  bool causal = false;
+};
+
+// Needs positive noise densities and pixel noise. Throws std::domain_error where the information is singular.
+CramerRaoBound cramer_rao_bound(const core::MeasurementLog& log, const sim::GroundTruth& truth,
+                                const BoundOptions& options);
+
+}  // namespace plumbline::eval

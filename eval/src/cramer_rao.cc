@@ -1,0 +1,307 @@
+#include "eval/cramer_rao.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <stdexcept>
+
+#include <Eigen/Eigenvalues>
+
+#include "estimator/factors/imu_factor.h"
+#include "estimator/factors/world_point.h"
+#include "eval/information_chain.h"
+
+namespace plumbline::eval {
+namespace {
+
+using core::kStateDof;
+using estimator::LocalMotion;
+using Variable = InformationChain::Variable;
+using StateVector = Eigen::Matrix<double, kStateDof, 1>;
+
+// Units in which the information of every block is of the same order, so that sums and differences keep their digits.
+StateVector state_units() {
+  StateVector u;
+  u << Eigen::Vector3d::Constant(1e-2), Eigen::Vector3d::Constant(1e-3), Eigen::Vector3d::Constant(1e-2),
+      Eigen::Vector3d::Constant(1e-4), Eigen::Vector3d::Constant(1e-2);
+  return u;
+}
+constexpr int kCalibrationDof = 8;  // the first rows of core::PosteriorCovariance
+Eigen::Matrix<double, kCalibrationDof, 1> calibration_units() {
+  Eigen::Matrix<double, kCalibrationDof, 1> u;
+  u << Eigen::Vector3d::Constant(1e-3), Eigen::Vector3d::Constant(1e-3), 1e-4, 1e-4;
+  return u;
+}
+
+struct Observation {
+  int track = 0;
+  estimator::WorldPointJacobians J;
+};
+
+struct TrackInfo {
+  std::size_t last_frame = 0;  // index into the options' frames
+  int observations = 0;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // on P_W, all else known
+  Eigen::MatrixXd basis;                                  // P_W = ... + basis x
+  Variable variable = -1;
+};
+
+class Builder {
+ public:
+  Builder(const core::MeasurementLog& log, const sim::GroundTruth& truth, const BoundOptions& options)
+      : log_(log), truth_(truth), options_(options) {
+    const std::array<bool, kCalibrationDof> is_free = {options.extrinsics, options.extrinsics, options.extrinsics,
+                                                       options.extrinsics, options.extrinsics, options.extrinsics,
+                                                       options.td,         options.readout};
+    for (int i = 0; i < kCalibrationDof; ++i) {
+      if (is_free[static_cast<std::size_t>(i)]) free_.push_back(i);
+    }
+    place_states();
+    linearise_observations();
+  }
+
+  CramerRaoBound build() {
+    add_priors();
+    for (std::size_t k = 0; k < options_.frames.size(); ++k) add_frame(k);
+    chain_.finish();
+    bound_.causal = std::move(causal_);
+    read_covariances();
+    add_aligned_errors();
+    add_kappa2();
+    return bound_;
+  }
+
+ private:
+  // State 0 at the prior's stamp, state k + 1 at the IMU sample nearest to the middle row of frame k.
+  void place_states() {
+    const auto nearest = [&](core::TimeNs t_ns) {
+      const auto after = std::lower_bound(truth_.states.begin(), truth_.states.end(), t_ns,
+                                          [](const core::StampedState& s, core::TimeNs t) { return s.t_ns < t; });
+      if (after == truth_.states.begin()) return std::size_t{0};
+      const auto i = static_cast<std::size_t>(after - truth_.states.begin());
+      if (after == truth_.states.end() || t_ns - (after - 1)->t_ns <= after->t_ns - t_ns) return i - 1;
+      return i;
+    };
+    samples_.push_back(nearest(log_.prior.t_ns));
+    for (const std::size_t frame : options_.frames) {
+      samples_.push_back(nearest(log_.frames[frame].t_cam_ns + core::to_ns(truth_.calibration.td_s)));
+    }
+  }
+
+  const core::State& state(std::size_t i) const { return truth_.states[samples_[i]].state; }
+
+  void linearise_observations() {
+    const estimator::CameraModel model{log_.camera, log_.pixel_sigma_px, log_.gravity_m_s2};
+    // The gap from a state to a row is at most half a readout and half an IMU interval.
+    const double reach_s = 0.5 * std::abs(truth_.calibration.readout_s) + 0.05;
+    std::map<std::int64_t, int> index;
+    observations_.resize(options_.frames.size());
+    double gap_sum_s = 0.0;
+    int count = 0;
+    for (std::size_t k = 0; k < options_.frames.size(); ++k) {
+      const core::Frame& frame = log_.frames[options_.frames[k]];
+      const core::State& x = state(k + 1);
+      const auto motion = std::make_shared<LocalMotion>(log_.imu, samples_[k + 1], reach_s, x.bias);
+      const estimator::FrameTiming timing{motion,
+                                          core::to_seconds(frame.t_cam_ns - truth_.states[samples_[k + 1]].t_ns)};
+      for (const core::PointObservation& point : frame.points) {
+        const auto landmark = truth_.track_landmark.find(point.track_id);
+        if (landmark == truth_.track_landmark.end()) continue;  // a false track has no truth
+        const Eigen::Vector3d& P_W = truth_.landmarks_W[static_cast<std::size_t>(landmark->second)];
+        estimator::WorldPointJacobians J;
+        const auto seen =
+            estimator::observe_world_point(model, timing, x, truth_.calibration, P_W, point.pixel.y(), &J);
+        if (!seen) continue;
+        const auto [entry, is_new] = index.try_emplace(point.track_id, static_cast<int>(tracks_.size()));
+        if (is_new) tracks_.emplace_back();
+        TrackInfo& track = tracks_[static_cast<std::size_t>(entry->second)];
+        ++track.observations;
+        track.last_frame = k;
+        track.information += J.point.transpose() * J.point;
+        observations_[k].push_back({entry->second, J});
+        gap_sum_s += std::abs(seen->tau_s);
+        ++count;
+      }
+    }
+    // A point that is seen once says nothing of the motion: its two rows are spent on itself.
+    for (TrackInfo& track : tracks_) {
+      if (track.observations >= 2) track.basis = observed_directions(track.information);
+    }
+    mean_gap_s_ = count > 0 ? gap_sum_s / count : 0.0;
+    per_frame_ = static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(1, options_.frames.size()));
+  }
+
+  // Scaled so that the information on them is the identity.
+  static Eigen::MatrixXd observed_directions(const Eigen::Matrix3d& information) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(information);
+    // Rounding leaves about 1e-15 of the largest eigenvalue where there is no parallax at all.
+    const double least = 1e-12 * eigen.eigenvalues()(2);
+    int first = 0;
+    while (eigen.eigenvalues()(first) < least) ++first;
+    return eigen.eigenvectors().rightCols(3 - first) *
+           eigen.eigenvalues().tail(3 - first).cwiseSqrt().cwiseInverse().asDiagonal();
+  }
+
+  void add_priors() {
+    states_.push_back(chain_.add(kStateDof));
+    const StateVector sigma = log_.prior.sigma.per_axis();
+    chain_.observe({states_[0]}, state_units().cwiseQuotient(sigma).asDiagonal());
+    if (free_.empty()) return;
+    calibration_ = chain_.add(static_cast<int>(free_.size()));
+    const core::CalibrationSigmas& s = log_.prior.calibration_sigma;
+    Eigen::Matrix<double, kCalibrationDof, 1> sigmas;
+    sigmas << Eigen::Vector3d::Constant(s.extrinsic_position_m), Eigen::Vector3d::Constant(s.extrinsic_rotation_rad),
+        s.td_s, s.readout_s;
+    chain_.observe({calibration_}, calibration_units().cwiseQuotient(sigmas)(free_).asDiagonal());
+  }
+
+  void add_inertial(std::size_t i) {
+    const std::span<const core::ImuSample> all(log_.imu);
+    const auto samples = all.subspan(samples_[i], samples_[i + 1] - samples_[i] + 1);
+    const estimator::ImuFactor factor(estimator::preintegrate(samples, state(i).bias, log_.imu_noise),
+                                      log_.gravity_m_s2);
+    const std::array<estimator::StateBlock, 2> blocks = {estimator::pack(state(i)), estimator::pack(state(i + 1))};
+    using Ambient = Eigen::Matrix<double, kStateDof, estimator::kStateSize, Eigen::RowMajor>;
+    std::array<Ambient, 2> ambient;
+    StateVector residual;
+    const std::array<const double*, 2> parameters = {blocks[0].data(), blocks[1].data()};
+    std::array<double*, 2> jacobians = {ambient[0].data(), ambient[1].data()};
+    factor.Evaluate(parameters.data(), residual.data(), jacobians.data());
+    Eigen::MatrixXd J(kStateDof, 2 * kStateDof);
+    for (std::size_t b = 0; b < 2; ++b) {
+      Eigen::Matrix<double, estimator::kStateSize, kStateDof, Eigen::RowMajor> plus;
+      estimator::StateManifold().PlusJacobian(blocks[b].data(), plus.data());
+      J.middleCols(static_cast<Eigen::Index>(b) * kStateDof, kStateDof) =
+          ambient[b] * plus * state_units().asDiagonal();
+    }
+    chain_.observe({states_[i], states_[i + 1]}, J);
+  }
+
+  void add_observation(std::size_t k, const Observation& observation) {
+    TrackInfo& track = tracks_[static_cast<std::size_t>(observation.track)];
+    if (track.basis.cols() == 0) return;
+    if (track.variable < 0) {
+      track.variable = chain_.add(static_cast<int>(track.basis.cols()));
+      alive_.push_back(observation.track);
+    }
+    const auto n_free = static_cast<Eigen::Index>(free_.size());
+    Eigen::MatrixXd J(2, kStateDof + n_free + track.basis.cols());
+    J.leftCols(kStateDof) = observation.J.state * state_units().asDiagonal();
+    Eigen::Matrix<double, 2, kCalibrationDof> calibration;
+    calibration << observation.J.extrinsics, observation.J.td, observation.J.readout;
+    J.middleCols(kStateDof, n_free) = (calibration * calibration_units().asDiagonal())(Eigen::all, free_);
+    J.rightCols(track.basis.cols()) = observation.J.point * track.basis;
+    std::vector<Variable> variables = {states_[k + 1]};
+    if (n_free > 0) variables.push_back(calibration_);
+    variables.push_back(track.variable);
+    chain_.observe(variables, J);
+  }
+
+  void add_frame(std::size_t k) {
+    states_.push_back(chain_.add(kStateDof));
+    add_inertial(k);
+    for (const Observation& observation : observations_[k]) add_observation(k, observation);
+    if (options_.causal) add_causal(k);
+
+    std::vector<Variable> done = {states_[k]};
+    std::erase_if(alive_, [&](int t) {
+      const TrackInfo& track = tracks_[static_cast<std::size_t>(t)];
+      if (track.last_frame != k) return false;
+      done.push_back(track.variable);
+      return true;
+    });
+    chain_.eliminate(done);
+  }
+
+  // Rows of `covariance` that stand for the free calibration and a state, and their units.
+  struct Layout {
+    std::vector<int> rows;
+    Eigen::VectorXd units;
+  };
+  Layout layout() const {
+    Layout l{.rows = free_, .units = Eigen::VectorXd(static_cast<Eigen::Index>(free_.size()) + kStateDof)};
+    for (int i = 0; i < kStateDof; ++i) l.rows.push_back(core::kCovLastState + i);
+    l.units << calibration_units()(free_), state_units();
+    return l;
+  }
+  std::vector<Variable> calibration_and(Variable state) const {
+    return free_.empty() ? std::vector<Variable>{state} : std::vector<Variable>{calibration_, state};
+  }
+
+  void add_causal(std::size_t k) {
+    std::vector<Variable> weak;
+    for (const int t : alive_) weak.push_back(tracks_[static_cast<std::size_t>(t)].variable);
+    const Layout l = layout();
+    const Eigen::MatrixXd scaled = chain_.causal_covariance(calibration_and(states_[k + 1]), weak);
+    CausalBound causal{.t_ns = truth_.states[samples_[k + 1]].t_ns};
+    causal.covariance(l.rows, l.rows) = l.units.asDiagonal() * scaled * l.units.asDiagonal();
+    causal_.push_back(std::move(causal));
+  }
+
+  void read_covariances() {
+    marginals_ = chain_.marginals();
+    const Eigen::Matrix<double, 6, 1> units = state_units().head<6>();
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      bound_.t_ns.push_back(truth_.states[samples_[i]].t_ns);
+      const Eigen::MatrixXd& Sigma = marginals_[static_cast<std::size_t>(states_[i])];
+      bound_.poses.push_back(units.asDiagonal() * Sigma.topLeftCorner<6, 6>() * units.asDiagonal());
+    }
+    const Layout l = layout();
+    Eigen::MatrixXd selected = Eigen::MatrixXd::Zero(chain_.total_dof(), l.units.size());
+    std::vector<int> rows;
+    for (const Variable v : calibration_and(states_.back())) {
+      for (int i = 0; i < chain_.dof(v); ++i) rows.push_back(chain_.offset(v) + i);
+    }
+    for (std::size_t i = 0; i < rows.size(); ++i) selected(rows[i], static_cast<Eigen::Index>(i)) = 1.0;
+    const Eigen::MatrixXd Sigma = chain_.solve(selected)(rows, Eigen::all);
+    bound_.covariance(l.rows, l.rows) =
+        l.units.asDiagonal() * (0.5 * (Sigma + Sigma.transpose())) * l.units.asDiagonal();
+  }
+
+  void add_aligned_errors() {
+    std::vector<core::Pose> poses;
+    std::vector<ScaledPose> rows;
+    const StateVector units = state_units();
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      poses.push_back(state(i).T_W_B);
+      const int first = chain_.offset(states_[i]);
+      rows.push_back(
+          {first + core::kPosition, first + core::kOrientation, units[core::kPosition], units[core::kOrientation]});
+    }
+    bound_.ate = aligned_bound(chain_, poses, rows, bound_.poses, options_.alignment);
+  }
+
+  void add_kappa2() {
+    const double pixels = log_.imu_noise.gyro_noise_density * log_.camera.fx_px / log_.pixel_sigma_px;
+    bound_.kappa2 = pixels * pixels * mean_gap_s_ * per_frame_;
+  }
+
+  const core::MeasurementLog& log_;
+  const sim::GroundTruth& truth_;
+  const BoundOptions& options_;
+  std::vector<int> free_;                               // rows of the calibration that are free
+  std::vector<std::size_t> samples_;                    // of the states
+  std::vector<std::vector<Observation>> observations_;  // of each frame
+  std::vector<TrackInfo> tracks_;
+  double mean_gap_s_ = 0.0;
+  double per_frame_ = 0.0;
+
+  InformationChain chain_;
+  Variable calibration_ = -1;
+  std::vector<Variable> states_;
+  std::vector<int> alive_;  // tracks
+  std::vector<CausalBound> causal_;
+  std::vector<Eigen::MatrixXd> marginals_;
+  CramerRaoBound bound_;
+};
+
+}  // namespace
+
+CramerRaoBound cramer_rao_bound(const core::MeasurementLog& log, const sim::GroundTruth& truth,
+                                const BoundOptions& options) {
+  return Builder(log, truth, options).build();
+}
+
+}  // namespace plumbline::eval
