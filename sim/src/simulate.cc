@@ -11,9 +11,9 @@ namespace plumbline::sim {
 
 Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
   const auto trajectory = make_trajectory(config.trajectory, config.duration_s, id);
-  std::vector<Eigen::Vector3d> landmarks = make_world(config.world, *trajectory, config.duration_s, id);
+  World world = make_world(config, *trajectory, id);
   ImuRecording imu = simulate_imu(*trajectory, config.imu, config.gravity_m_s2, config.duration_s, id);
-  CameraRecording camera = simulate_camera(*trajectory, landmarks, config, kCameraLeadS, id);
+  CameraRecording camera = simulate_camera(*trajectory, world.points_W, config, kCameraLeadS, id);
 
   Simulation s;
   s.truth.calibration = config.calibration();
@@ -22,7 +22,7 @@ Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
     const Kinematics k = trajectory->at(core::to_seconds(imu.samples[i].t_ns));
     s.truth.states.push_back({imu.samples[i].t_ns, {.T_W_B = k.T_W_B, .v_W = k.v_W, .bias = imu.biases[i]}});
   }
-  s.truth.landmarks_W = std::move(landmarks);
+  s.truth.landmarks_W = std::move(world.points_W);
   s.truth.track_landmark = std::move(camera.track_landmark);
 
   s.measurements = {.imu = std::move(imu.samples),
