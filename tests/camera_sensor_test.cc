@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "core/time.h"
+#include "sim/frame_view.h"
 #include "sim/world.h"
 
 namespace plumbline::sim {

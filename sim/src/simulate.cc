@@ -5,6 +5,7 @@
 #include "sim/camera_sensor.h"
 #include "sim/imu_sensor.h"
 #include "sim/prior.h"
+#include "sim/track_velocity.h"
 #include "sim/world.h"
 
 namespace plumbline::sim {
@@ -32,6 +33,10 @@ Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
                     .imu_noise = config.imu.noise,
                     .pixel_sigma_px = config.camera.pixel_sigma_px,
                     .gravity_m_s2 = config.gravity_m_s2};
+  if (config.points.velocity_source == VelocitySource::kFiniteDifference) {
+    add_finite_difference_velocities(s.measurements.frames, s.measurements.camera,
+                                     s.measurements.prior.calibration.readout_s);
+  }
   return s;
 }
 
