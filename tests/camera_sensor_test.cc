@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "core/time.h"
+#include "sim/frame_view.h"
 #include "sim/world.h"
 
 namespace plumbline::sim {
@@ -41,7 +42,7 @@ struct Scene {
   explicit Scene(const ScenarioConfig& c, core::TrialId id = kId)
       : config(c),
         trajectory(make_trajectory(c.trajectory, c.duration_s, id)),
-        landmarks(make_world(c.world, *trajectory, c.duration_s, id)),
+        landmarks(make_world(c, *trajectory, id).points_W),
         calibration(c.calibration()),
         recording(simulate_camera(*trajectory, landmarks, c, kLeadS, id)) {}
 

@@ -57,7 +57,7 @@ bool same(const std::vector<core::ImuSample>& a, const std::vector<core::ImuSamp
 
 bool same(const std::vector<core::Frame>& a, const std::vector<core::Frame>& b) {
   const auto same_point = [](const core::PointObservation& x, const core::PointObservation& y) {
-    return x.track_id == y.track_id && x.pixel == y.pixel;
+    return x.track_id == y.track_id && x.pixel == y.pixel && x.velocity == y.velocity;
   };
   return std::ranges::equal(a, b, [&](const core::Frame& x, const core::Frame& y) {
     return x.t_cam_ns == y.t_cam_ns && std::ranges::equal(x.points, y.points, same_point);

@@ -11,8 +11,8 @@
 
 namespace plumbline::core {
 
-CsvReader::CsvReader(const std::filesystem::path& file, std::size_t columns)
-    : name_(file.generic_string()), columns_(columns) {
+CsvReader::CsvReader(const std::filesystem::path& file, std::size_t columns, std::size_t optional_columns)
+    : name_(file.generic_string()), columns_(columns), optional_columns_(optional_columns) {
   std::ifstream in(file, std::ios::binary);
   if (!in || std::filesystem::is_directory(file)) throw DataError(fmt::format("{}: cannot be read", name_));
   text_.assign(std::istreambuf_iterator<char>(in), {});
@@ -34,7 +34,9 @@ bool CsvReader::next() {
       fields_.push_back(line.substr(start, comma - start));
       start = comma + 1;
     }
-    if (fields_.size() != columns_) fail(fmt::format("has {} columns, needs {}", fields_.size(), columns_));
+    if (fields_.size() != columns_ && fields_.size() != columns_ + optional_columns_) {
+      fail(fmt::format("has {} columns, needs {}", fields_.size(), columns_ + optional_columns_));
+    }
     return true;
   }
   return false;

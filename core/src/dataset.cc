@@ -181,11 +181,12 @@ void write_dataset(const std::filesystem::path& folder, const MeasurementLog& lo
   write_yaml(folder / kImuSensor, ImuSensorFile{log.imu_noise});
 
   std::string frames = "#timestamp [ns] (camera clock)\n";
-  std::string points = "#frame_ns,track_id,u [px],v [px]\n";
+  std::string points = "#frame_ns,track_id,u [px],v [px],vx [s^-1],vy [s^-1]\n";
   for (const Frame& frame : log.frames) {
     frames += fmt::format("{}\n", frame.t_cam_ns);
     for (const PointObservation& point : frame.points) {
-      points += fmt::format("{},{},{},{}\n", frame.t_cam_ns, point.track_id, point.pixel.x(), point.pixel.y());
+      points += fmt::format("{},{},{},{},", frame.t_cam_ns, point.track_id, point.pixel.x(), point.pixel.y());
+      points += point.velocity ? fmt::format("{},{}\n", point.velocity->x(), point.velocity->y()) : ",\n";
     }
   }
   write_file_atomically(folder / kFramesFile, frames);
@@ -231,7 +232,7 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
     check_increasing(frames, log.frames.empty() ? 0 : log.frames.back().t_cam_ns, t_ns, log.frames.empty());
     log.frames.push_back({t_ns, {}});
   }
-  CsvReader points(folder / kPointsFile, 4);
+  CsvReader points(folder / kPointsFile, 4, 2);
   auto frame = log.frames.begin();
   while (points.next()) {
     const TimeNs t_ns = points.integer(0);
@@ -239,7 +240,10 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
     if (frame == log.frames.end() || frame->t_cam_ns != t_ns) {
       points.fail(fmt::format("frame {} is not in {}, or out of order", t_ns, kFramesFile));
     }
-    frame->points.push_back({points.integer(1), {points.number(2), points.number(3)}});
+    core::PointObservation& point = frame->points.emplace_back();
+    point.track_id = points.integer(1);
+    point.pixel = {points.number(2), points.number(3)};
+    if (points.has(4) || points.has(5)) point.velocity = {points.number(4), points.number(5)};
   }
   return log;
 }

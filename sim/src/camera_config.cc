@@ -33,6 +33,8 @@ void visit(core::ConfigVisitor& v, PointsConfig& c) {
   v.value("farthest_m", c.farthest_m, positive(), "largest depth that is tracked");
   v.value("loss_probability", c.loss_probability, probability(), "that a track ends at a frame");
   v.value("longest_track_frames", c.longest_track_frames, at_least(0), "a track ends after as many; 0 is no limit");
+  v.choice("velocity_source", c.velocity_source, kVelocitySourceNames,
+           "of the image velocities: a tracker's, from the noisy pixels of consecutive frames; the truth; or absent");
 }
 
 std::optional<core::RuleViolation> validate(const CameraConfig& c) {

@@ -5,15 +5,16 @@
 #include "sim/camera_sensor.h"
 #include "sim/imu_sensor.h"
 #include "sim/prior.h"
+#include "sim/track_velocity.h"
 #include "sim/world.h"
 
 namespace plumbline::sim {
 
 Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
   const auto trajectory = make_trajectory(config.trajectory, config.duration_s, id);
-  std::vector<Eigen::Vector3d> landmarks = make_world(config.world, *trajectory, config.duration_s, id);
+  World world = make_world(config, *trajectory, id);
   ImuRecording imu = simulate_imu(*trajectory, config.imu, config.gravity_m_s2, config.duration_s, id);
-  CameraRecording camera = simulate_camera(*trajectory, landmarks, config, kCameraLeadS, id);
+  CameraRecording camera = simulate_camera(*trajectory, world.points_W, config, kCameraLeadS, id);
 
   Simulation s;
   s.truth.calibration = config.calibration();
@@ -22,7 +23,7 @@ Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
     const Kinematics k = trajectory->at(core::to_seconds(imu.samples[i].t_ns));
     s.truth.states.push_back({imu.samples[i].t_ns, {.T_W_B = k.T_W_B, .v_W = k.v_W, .bias = imu.biases[i]}});
   }
-  s.truth.landmarks_W = std::move(landmarks);
+  s.truth.landmarks_W = std::move(world.points_W);
   s.truth.track_landmark = std::move(camera.track_landmark);
 
   s.measurements = {.imu = std::move(imu.samples),
@@ -32,6 +33,10 @@ Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
                     .imu_noise = config.imu.noise,
                     .pixel_sigma_px = config.camera.pixel_sigma_px,
                     .gravity_m_s2 = config.gravity_m_s2};
+  if (config.points.velocity_source == VelocitySource::kFiniteDifference) {
+    add_finite_difference_velocities(s.measurements.frames, s.measurements.camera,
+                                     s.measurements.prior.calibration.readout_s);
+  }
   return s;
 }
 

@@ -2,7 +2,7 @@
 //   meta.yaml                 schema, conventions, where it comes from
 //   prior.yaml                what is known beforehand (mean, sigmas, start)
 //   mav0/imu0/{data.csv, sensor.yaml}
-//   mav0/cam0/{data.csv, points.csv, sensor.yaml}
+//   mav0/cam0/{data.csv, points.csv, sensor.yaml}     points: frame_ns, track_id, u, v, and vx, vy where known
 // Numbers are written in their shortest form that reads back to the bit, stamps as integer nanoseconds.
 #pragma once
 

@@ -1,7 +1,9 @@
 // The keys of scenario.camera and scenario.points: the camera, how it is mounted, and what it tracks.
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string_view>
 
 #include <Eigen/Core>
 
@@ -26,12 +28,17 @@ struct CameraConfig {
 void visit(core::ConfigVisitor& v, CameraConfig& c);
 std::optional<core::RuleViolation> validate(const CameraConfig& c);
 
+// Where the image velocities of the observations come from.
+enum class VelocitySource { kFiniteDifference, kExact, kNone };
+inline constexpr std::array<std::string_view, 3> kVelocitySourceNames = {"finite_difference", "exact", "none"};
+
 struct PointsConfig {
   int per_frame = 100;
   double nearest_m = 0.5;
   double farthest_m = 15.0;
   double loss_probability = 0.0;
   int longest_track_frames = 0;
+  VelocitySource velocity_source = VelocitySource::kFiniteDifference;
 };
 
 void visit(core::ConfigVisitor& v, PointsConfig& c);

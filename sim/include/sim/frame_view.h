@@ -1,0 +1,54 @@
+// One frame of a camera with a time offset and a rolling shutter: where and when it sees a landmark.
+//   v = h_v(T_W_C(t_imu(v)), P_W),   t_imu(v) = t_cam + td + (v - rows/2) readout / rows
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "core/calibration.h"
+#include "core/camera.h"
+#include "sim/trajectory.h"
+
+namespace plumbline::sim {
+
+struct Exposure {
+  Eigen::Vector2d pixel;
+  double t_imu_s = 0.0;  // when its row was exposed, IMU clock
+  double depth_m = 0.0;
+};
+
+// The rig at one frame: what the exact solve of many landmarks shares.
+class FrameView {
+ public:
+  // t_cam_s: the frame's stamp, camera clock.
+  FrameView(const Trajectory& trajectory, const core::PinholeCamera& camera, const core::RigCalibration& calibration,
+            double t_cam_s);
+
+  // Where the landmark is seen, and when: the solution of the equation above to 1e-12 s in time, by Newton's method
+  // with the vertical flow of the middle row. Nothing where the landmark is not in front of the camera at that time.
+  std::optional<Exposure> expose(const Eigen::Vector3d& P_W) const;
+
+  // False only for a landmark that is certainly outside the picture or the range of depth: a test by the pose of the
+  // middle row with the margin that the motion during the readout asks for.
+  bool may_see(const Eigen::Vector3d& P_W, double nearest_m, double farthest_m) const;
+
+  // d(x, y)/dt [1/s] of the landmark's normalised coordinates x = X/Z, y = Y/Z in the moving camera, at an instant.
+  Eigen::Vector2d image_velocity(const Eigen::Vector3d& P_W, double t_imu_s) const;
+
+ private:
+  core::Pose camera_pose_at(double t_imu_s) const;
+
+  const Trajectory& trajectory_;
+  const core::PinholeCamera& camera_;
+  const core::RigCalibration& calibration_;
+  double t_middle_s_;
+  core::Pose T_C_W_middle_;
+  Eigen::Vector3d v_C_;      // of the camera in the world, in camera axes
+  Eigen::Vector3d omega_C_;  // of the camera, in camera axes
+  double cos_half_angle_;    // of the cone about the optical axis that holds the picture and the margin
+  double reach_m_;           // how far the camera moves during half the readout
+  double turn_rad_;          // how far it turns
+};
+
+}  // namespace plumbline::sim

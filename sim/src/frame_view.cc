@@ -1,0 +1,85 @@
+#include "sim/frame_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace plumbline::sim {
+
+FrameView::FrameView(const Trajectory& trajectory, const core::PinholeCamera& camera,
+                     const core::RigCalibration& calibration, double t_cam_s)
+    : trajectory_(trajectory), camera_(camera), calibration_(calibration), t_middle_s_(t_cam_s + calibration.td_s) {
+  const Kinematics k = trajectory.at(t_middle_s_);
+  const core::Pose T_W_C = k.T_W_B * calibration.T_B_C;
+  T_C_W_middle_ = T_W_C.inverse();
+  const Eigen::Vector3d v_W = k.v_W + k.T_W_B.q * k.omega_B.cross(calibration.T_B_C.p);
+  v_C_ = T_C_W_middle_.q * v_W;
+  omega_C_ = calibration.T_B_C.q.conjugate() * k.omega_B;
+
+  double half_angle = 0.0;
+  for (const double u : {-0.5, camera.width_px - 0.5}) {
+    for (const double v : {-0.5, camera.height_px - 0.5}) {
+      const Eigen::Vector3d corner = camera.unproject({u, v});
+      half_angle = std::max(half_angle, std::acos(1.0 / corner.norm()));
+    }
+  }
+  // Twice the motion that the middle row's speed and rate predict, so that their change is covered.
+  const double half_readout_s = 0.5 * std::abs(calibration.readout_s);
+  turn_rad_ = 2.0 * omega_C_.norm() * half_readout_s;
+  half_angle += turn_rad_;
+  reach_m_ = 2.0 * v_C_.norm() * half_readout_s;
+  cos_half_angle_ = std::cos(std::min(half_angle, std::numbers::pi));
+}
+
+core::Pose FrameView::camera_pose_at(double t_imu_s) const { return trajectory_.pose_at(t_imu_s) * calibration_.T_B_C; }
+
+bool FrameView::may_see(const Eigen::Vector3d& P_W, double nearest_m, double farthest_m) const {
+  const Eigen::Vector3d P_C = T_C_W_middle_ * P_W;
+  const double margin_m = reach_m_ + turn_rad_ * P_C.norm();
+  if (P_C.z() < nearest_m - margin_m || P_C.z() > farthest_m + margin_m) return false;
+  return P_C.z() + reach_m_ > cos_half_angle_ * (P_C.norm() - reach_m_);
+}
+
+std::optional<Exposure> FrameView::expose(const Eigen::Vector3d& P_W) const {
+  const double s_per_row = calibration_.readout_s / camera_.height_px;
+  const double middle_row = 0.5 * camera_.height_px;
+
+  Eigen::Matrix<double, 2, 3> J;
+  const Eigen::Vector3d P_C_middle = T_C_W_middle_ * P_W;
+  const auto middle = camera_.project(P_C_middle, &J);
+  if (!middle) return std::nullopt;
+  // dP_C/dt = -v_C - omega_C x P_C
+  const double flow_rows_s = J.row(1).dot(-v_C_ - omega_C_.cross(P_C_middle));
+  const double slope = 1.0 - flow_rows_s * s_per_row;
+  // The picture of a landmark that moves as fast as the shutter has no unique row.
+  if (slope < 0.2) return std::nullopt;
+
+  constexpr int kMaxIterations = 50;
+  constexpr double kToleranceS = 1e-12;
+  double v = middle_row + (middle->y() - middle_row) / slope;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    const double t = t_middle_s_ + (v - middle_row) * s_per_row;
+    const Eigen::Vector3d P_C = camera_pose_at(t).inverse() * P_W;
+    const auto pixel = camera_.project(P_C);
+    if (!pixel) return std::nullopt;
+    const double defect = pixel->y() - v;
+    if (std::abs(defect * s_per_row) < kToleranceS) {
+      return Exposure{.pixel = *pixel, .t_imu_s = t, .depth_m = P_C.z()};
+    }
+    v += defect / slope;
+  }
+  return std::nullopt;
+}
+
+Eigen::Vector2d FrameView::image_velocity(const Eigen::Vector3d& P_W, double t_imu_s) const {
+  const Kinematics k = trajectory_.at(t_imu_s);
+  const core::Pose& T_B_C = calibration_.T_B_C;
+  const Eigen::Vector3d P_B = k.T_W_B.inverse() * P_W;
+  const Eigen::Vector3d P_C = T_B_C.inverse() * P_B;
+  // dP_B/dt = -R_W_B^T v_W - omega_B x P_B
+  const Eigen::Vector3d P_B_dot = -(k.T_W_B.q.conjugate() * k.v_W) - k.omega_B.cross(P_B);
+  const Eigen::Vector3d P_C_dot = T_B_C.q.conjugate() * P_B_dot;
+  return (P_C_dot.head<2>() - P_C.head<2>() * (P_C_dot.z() / P_C.z())) / P_C.z();
+}
+
+}  // namespace plumbline::sim
