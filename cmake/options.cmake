@@ -7,6 +7,7 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
 option(PLUMBLINE_TESTS "Build the tests" ON)
 option(PLUMBLINE_BENCHMARKS "Build the benchmarks (Google Benchmark)" ON)
+option(PLUMBLINE_FUZZERS "Build the fuzzers (clang only)" OFF)
 set(PLUMBLINE_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize: address,undefined or thread")
 
 add_library(plumbline_options INTERFACE)
