@@ -1,114 +1,149 @@
-// Laws that every factor obeys, as checks that a test calls with a factor and its parameter blocks.
+// Laws that every factor obeys, as one suite. A test file describes its factors as subjects and instantiates
+//   INSTANTIATE_TEST_SUITE_P(Points, FactorLaws, ::testing::ValuesIn(subjects()), subject_name);
+//   VanishesAtTheTruth        r = 0 at the truth of a simulated scene without noise
+//   JacobiansEqualAutomatic   analytic Jacobians equal those of the reference, by automatic differentiation
+//   JacobiansMatchRidders     and those of differences on the manifold, which know the residual only
+//   EveryNullJacobianPath     what is asked for does not depend on what else is
+//   HoldsAtTheLimits          zero angles, far and near: finite, and still equal to the reference
+//   WhitensItsNoise           residuals of simulated noise have unit covariance
+//   DoesNotSeeYawNorPlace     yaw and translation of the whole world leave the cost as it is
 #pragma once
 
-#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 #include <ceres/cost_function.h>
-#include <ceres/manifold.h>
 #include <gtest/gtest.h>
+
+#include "core/lie.h"
+#include "factor_checks.h"
 
 namespace plumbline::testing {
 
-struct Block {
-  std::vector<double> values;
-  const ceres::Manifold* manifold = nullptr;  // Euclidean where null
-
-  int tangent_size() const { return manifold != nullptr ? manifold->TangentSize() : static_cast<int>(values.size()); }
-  std::vector<double> plus(const Eigen::VectorXd& delta) const {
-    std::vector<double> moved(values.size());
-    if (manifold != nullptr) {
-      manifold->Plus(values.data(), delta.data(), moved.data());
-    } else {
-      for (std::size_t i = 0; i < values.size(); ++i) moved[i] = values[i] + delta[static_cast<int>(i)];
-    }
-    return moved;
-  }
+struct SceneRequest {
+  std::uint64_t scene = 0;  // which geometry
+  double noise = 0.0;       // of the measurements, in units of what the factor believes in
+  std::uint64_t draw = 0;   // which noise
+  bool off_truth = false;   // parameters away from the truth, so that no term of a Jacobian vanishes
+  core::Pose T_new_W = {};  // yaw and translation of the whole world, displaced parameters and all
 };
 
-template <class Vector>
-Block block(const Vector& x, const ceres::Manifold* manifold = nullptr) {
-  return {std::vector<double>(x.data(), x.data() + x.size()), manifold};
+struct FactorScene {
+  std::unique_ptr<ceres::CostFunction> factor;
+  std::unique_ptr<ceres::CostFunction> reference;  // the plain formula, by automatic differentiation
+  std::vector<Block> blocks;
+};
+
+struct FactorSubject {
+  std::string name;
+  std::function<FactorScene(const SceneRequest&)> scene;
+  std::function<std::vector<FactorScene>()> limits;
+  double zero_tolerance = 1e-9;        // of whitened residuals at the truth; what the model itself neglects
+  double automatic_tolerance = 1e-10;  // relative to the largest entry of a block
+  double ridders_tolerance = 1e-6;     // likewise; what differences across the model's kinks leave
+  double whitening_slack = 0.0;        // of the covariance: what the noise model neglects knowingly
+};
+
+inline void PrintTo(const FactorSubject& subject, std::ostream* out) { *out << subject.name; }
+inline std::string subject_name(const ::testing::TestParamInfo<FactorSubject>& info) { return info.param.name; }
+
+class FactorLaws : public ::testing::TestWithParam<FactorSubject> {
+ protected:
+  static constexpr std::uint64_t kScenes = 8;
+};
+
+TEST_P(FactorLaws, VanishesAtTheTruth) {
+  for (std::uint64_t i = 0; i < kScenes; ++i) {
+    const FactorScene s = GetParam().scene({.scene = i});
+    EXPECT_LT(residual(*s.factor, s.blocks).cwiseAbs().maxCoeff(), GetParam().zero_tolerance) << "scene " << i;
+  }
 }
 
-inline std::vector<const double*> pointers(const std::vector<Block>& blocks) {
-  std::vector<const double*> p;
-  for (const Block& b : blocks) p.push_back(b.values.data());
-  return p;
+TEST_P(FactorLaws, JacobiansEqualAutomatic) {
+  for (std::uint64_t i = 0; i < kScenes; ++i) {
+    SCOPED_TRACE(i);
+    const FactorScene s = GetParam().scene({.scene = i, .noise = 1.0, .off_truth = true});
+    expect_equal_factors(*s.factor, *s.reference, s.blocks, GetParam().automatic_tolerance);
+  }
 }
 
-inline Eigen::VectorXd residual(const ceres::CostFunction& factor, const std::vector<Block>& blocks) {
-  Eigen::VectorXd r(factor.num_residuals());
-  EXPECT_TRUE(factor.Evaluate(pointers(blocks).data(), r.data(), nullptr));
-  return r;
+TEST_P(FactorLaws, JacobiansMatchRidders) {
+  for (std::uint64_t i = 0; i < kScenes; ++i) {
+    SCOPED_TRACE(i);
+    const FactorScene s = GetParam().scene({.scene = i, .noise = 1.0, .off_truth = true});
+    for (std::size_t k = 0; k < s.blocks.size(); ++k) {
+      expect_jacobian(*s.factor, s.blocks, k, s.blocks[k].ridders_step, GetParam().ridders_tolerance);
+    }
+  }
 }
 
-// The analytic Jacobian of block k on its tangent space.
-inline Eigen::MatrixXd tangent_jacobian(const ceres::CostFunction& factor, const std::vector<Block>& blocks,
-                                        std::size_t k) {
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Block& b = blocks[k];
-  RowMajor ambient(factor.num_residuals(), static_cast<int>(b.values.size()));
-  std::vector<double*> jacobians(blocks.size(), nullptr);  // the other blocks are constant: the null-Jacobian path
-  jacobians[k] = ambient.data();
-  Eigen::VectorXd r(factor.num_residuals());
-  EXPECT_TRUE(factor.Evaluate(pointers(blocks).data(), r.data(), jacobians.data()));
-  if (b.manifold == nullptr) return ambient;
-  RowMajor plus(static_cast<int>(b.values.size()), b.tangent_size());
-  EXPECT_TRUE(b.manifold->PlusJacobian(b.values.data(), plus.data()));
-  return ambient * plus;
-}
-
-// By Ridders' method: central differences of shrinking step, extrapolated to step 0, the best by its own error
-// estimate. Knows the residual only.
-inline Eigen::MatrixXd ridders_jacobian(const ceres::CostFunction& factor, const std::vector<Block>& blocks,
-                                        std::size_t k, double first_step) {
-  constexpr int kSteps = 8;
-  constexpr double kShrink = 2.0;
-  const int n = blocks[k].tangent_size();
-  Eigen::MatrixXd J(factor.num_residuals(), n);
-  for (int c = 0; c < n; ++c) {
-    const auto difference = [&](double h) -> Eigen::VectorXd {
-      Eigen::VectorXd delta = Eigen::VectorXd::Zero(n);
-      std::vector<Block> moved = blocks;
-      delta[c] = h;
-      moved[k].values = blocks[k].plus(delta);
-      const Eigen::VectorXd forward = residual(factor, moved);
-      delta[c] = -h;
-      moved[k].values = blocks[k].plus(delta);
-      return (forward - residual(factor, moved)) / (2.0 * h);
-    };
-    std::vector<std::vector<Eigen::VectorXd>> table(kSteps);
-    double best_error = std::numeric_limits<double>::infinity();
-    double h = first_step;
-    for (std::size_t i = 0; i < kSteps; ++i, h /= kShrink) {
-      table[i].push_back(difference(h));
-      double factor2 = kShrink * kShrink;
-      for (std::size_t j = 1; j <= i; ++j, factor2 *= kShrink * kShrink) {
-        table[i].push_back((factor2 * table[i][j - 1] - table[i - 1][j - 1]) / (factor2 - 1.0));
-        const double error =
-            std::max((table[i][j] - table[i][j - 1]).norm(), (table[i][j] - table[i - 1][j - 1]).norm());
-        if (error < best_error) {
-          best_error = error;
-          J.col(c) = table[i][j];
-        }
+TEST_P(FactorLaws, EveryNullJacobianPath) {
+  const FactorScene s = GetParam().scene({.scene = 1, .noise = 1.0, .off_truth = true});
+  const Eigen::VectorXd r = residual(*s.factor, s.blocks);
+  const Evaluation all = evaluate(*s.factor, s.blocks, std::vector<bool>(s.blocks.size(), true));
+  EXPECT_EQ(all.residual, r);
+  for (std::size_t k = 0; k < s.blocks.size(); ++k) {
+    for (const bool alone : {true, false}) {
+      std::vector<bool> wanted(s.blocks.size(), !alone);
+      wanted[k] = alone;
+      const Evaluation some = evaluate(*s.factor, s.blocks, wanted);
+      EXPECT_EQ(some.residual, r);
+      for (std::size_t j = 0; j < s.blocks.size(); ++j) {
+        if (!wanted[j]) continue;
+        EXPECT_EQ(some.jacobians[j], all.jacobians[j]) << "block " << j << ", path of block " << k;
       }
     }
   }
-  return J;
 }
 
-// `first_step` in the units of the block's tangent; the tolerance is relative to the largest entry of the block.
-inline void expect_jacobian(const ceres::CostFunction& factor, const std::vector<Block>& blocks, std::size_t k,
-                            double first_step, double tolerance) {
-  const Eigen::MatrixXd analytic = tangent_jacobian(factor, blocks, k);
-  const Eigen::MatrixXd numeric = ridders_jacobian(factor, blocks, k, first_step);
-  const double scale = std::max(numeric.cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_LT((analytic - numeric).cwiseAbs().maxCoeff() / scale, tolerance) << "block " << k << "\nanalytic\n"
-                                                                           << analytic << "\nnumeric\n"
-                                                                           << numeric;
+TEST_P(FactorLaws, HoldsAtTheLimits) {
+  const std::vector<FactorScene> limits = GetParam().limits();
+  ASSERT_FALSE(limits.empty());
+  for (std::size_t i = 0; i < limits.size(); ++i) {
+    SCOPED_TRACE(i);
+    const FactorScene& s = limits[i];
+    const Evaluation all = evaluate(*s.factor, s.blocks, std::vector<bool>(s.blocks.size(), true));
+    EXPECT_TRUE(all.residual.allFinite());
+    for (const auto& J : all.jacobians) EXPECT_TRUE(J.allFinite());
+    expect_equal_factors(*s.factor, *s.reference, s.blocks, GetParam().automatic_tolerance);
+  }
+}
+
+TEST_P(FactorLaws, WhitensItsNoise) {
+  constexpr int kDraws = 1500;
+  Eigen::MatrixXd covariance;
+  for (int i = 0; i < kDraws; ++i) {
+    const FactorScene s = GetParam().scene(
+        {.scene = static_cast<std::uint64_t>(i) % kScenes, .noise = 1.0, .draw = 1 + static_cast<std::uint64_t>(i)});
+    const Eigen::VectorXd r = residual(*s.factor, s.blocks);
+    if (i == 0) covariance.setZero(r.size(), r.size());
+    covariance += r * r.transpose() / kDraws;
+  }
+  // Diagonal entries are chi2(n)/n, standard deviation sqrt(2/n) = 3.7 %, the others have 1/sqrt(n) = 2.6 %: 4.5
+  // sigma, since there are up to 120 of them.
+  const double off_diagonal = 4.5 / std::sqrt(kDraws) + GetParam().whitening_slack;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) EXPECT_NEAR(covariance(i, j), 0.0, off_diagonal) << i << " " << j;
+    EXPECT_NEAR(covariance(i, i), 1.0, 4.5 * std::sqrt(2.0 / kDraws) + GetParam().whitening_slack) << i;
+  }
+}
+
+TEST_P(FactorLaws, DoesNotSeeYawNorPlace) {
+  const core::Pose moved{core::exp_quaternion(Eigen::Vector3d(0.0, 0.0, 1.2)), {3.0, -2.0, 5.0}};
+  for (std::uint64_t i = 0; i < kScenes; ++i) {
+    const FactorScene here = GetParam().scene({.scene = i, .noise = 1.0, .off_truth = true});
+    const FactorScene there = GetParam().scene({.scene = i, .noise = 1.0, .off_truth = true, .T_new_W = moved});
+    const double cost = residual(*here.factor, here.blocks).squaredNorm();
+    ASSERT_GT(cost, 0.0);
+    // Rounding of coordinates of 10 m, seen through derivatives of the whitened residual of up to 1e5.
+    EXPECT_NEAR(residual(*there.factor, there.blocks).squaredNorm() / cost, 1.0, 1e-8) << "scene " << i;
+  }
 }
 
 }  // namespace plumbline::testing
