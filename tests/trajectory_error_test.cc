@@ -1,13 +1,13 @@
 #include "eval/trajectory_error.h"
 
+#include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <numbers>
+#include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -24,6 +24,7 @@ using core::StampedPose;
 using Poses = std::vector<StampedPose>;
 
 constexpr core::TimeNs kMs = 1'000'000;
+constexpr core::TimeNs kFarApart = core::kNsPerSecond;  // too far apart to interpolate between
 
 // n poses `interval` apart on a curve without symmetry, a function of time alone.
 Poses path(int n, core::TimeNs interval = 50 * kMs, core::TimeNs start = 0) {
@@ -114,18 +115,53 @@ TEST(TrajectoryError, AlignmentTurnsOrientationsToo) {
 }
 
 TEST(Association, RatesMayDiffer) {
-  for (const auto& [estimate, truth] :
-       {std::pair(path(100, 50 * kMs), path(1000, 5 * kMs)), std::pair(path(1000, 5 * kMs), path(100, 50 * kMs))}) {
-    const Association a = associate(estimate, truth);
-    EXPECT_EQ(a.pairs.size(), 100U);
-    EXPECT_GE(a.coverage, 0.99);  // a denser truth goes on after the last estimate
-    for (const PosePair& pair : a.pairs) EXPECT_EQ(pair.estimate.p, pair.truth.p);
+  const Poses dense = path(1000, 5 * kMs);
+  const Poses sparse = path(100, 50 * kMs);
+  const Association a = associate(sparse, dense);
+  EXPECT_EQ(a.pairs.size(), 100U);
+  EXPECT_EQ(a.interpolated, 0);
+  EXPECT_GE(a.coverage, 0.99);  // a denser truth goes on after the last estimate
+  for (const PosePair& pair : a.pairs) EXPECT_EQ(pair.estimate.p, pair.truth.p);
+
+  const Association b = associate(dense, sparse);
+  EXPECT_EQ(b.pairs.size(), 991U);  // the last nine lie after the last true pose
+  EXPECT_EQ(b.interpolated, 891);
+  EXPECT_EQ(b.coverage, 1.0);
+  EXPECT_DOUBLE_EQ(b.largest_bridged_s, 0.05);
+}
+
+// Half way between two poses the chord is a dt^2 / 8 inside the curve; its attitude is half way too.
+TEST(Association, InterpolatesTheTruthAtTheEstimatesStamps) {
+  const Poses truth = path(100, 20 * kMs);
+  const Poses estimate = path(99, 20 * kMs, 10 * kMs);
+  const Association a = associate(estimate, truth);
+  ASSERT_EQ(a.pairs.size(), 99U);
+  EXPECT_EQ(a.interpolated, 99);
+  double largest = 0.0;
+  for (const PosePair& pair : a.pairs) {
+    const Eigen::Vector3d error = pair.truth.p - pair.estimate.p;
+    largest = std::max(largest, error.norm());
+    EXPECT_LT(core::rotation_angle(pair.truth.q.conjugate() * pair.estimate.q), 1e-5);
   }
+  // Accelerations of the path: at most 1 and 1.69 m/s^2 on x and y.
+  EXPECT_LT(largest, std::hypot(1.0, 1.69) * 0.02 * 0.02 / 8.0);
+  EXPECT_GT(largest, 1.0 * 0.02 * 0.02 / 8.0);
+}
+
+TEST(Association, DoesNotBridgeGapsOfTheTruth) {
+  Poses truth = path(100, 20 * kMs);
+  truth.erase(truth.begin() + 41, truth.begin() + 50);  // from 0.80 s to 1.00 s: 0.2 s, bridged
+  truth.erase(truth.begin() + 61, truth.begin() + 71);  // from 1.38 s to 1.60 s: 0.22 s
+  const Association a = associate(path(100, 20 * kMs), truth);
+  EXPECT_EQ(a.interpolated, 9);
+  EXPECT_DOUBLE_EQ(a.largest_bridged_s, 0.2);
+  EXPECT_EQ(a.pairs.size(), 90U);
+  EXPECT_EQ(a.coverage, 1.0);  // gaps of the truth are not the estimate's fault
 }
 
 TEST(Association, IsOneToOneAndTheNearerWins) {
-  const Poses truth = path(3, 10 * kMs);
-  Poses estimate = path(3, 10 * kMs);
+  const Poses truth = path(3, kFarApart);
+  Poses estimate = truth;
   estimate[1].t_ns -= 300'000;
   StampedPose nearer = estimate[1];
   nearer.t_ns = truth[1].t_ns + 200'000;
@@ -134,15 +170,20 @@ TEST(Association, IsOneToOneAndTheNearerWins) {
   const Association a = associate(estimate, truth);
   ASSERT_EQ(a.pairs.size(), 3U);
   EXPECT_EQ(a.pairs[1].estimate.p.x(), 42.0);
+  EXPECT_EQ(a.pairs[1].estimate_index, 2U);
   EXPECT_EQ(a.pairs[1].truth.p, truth[1].T_W_B.p);
+
+  estimate[2].t_ns = truth[1].t_ns;  // an exact one wins over a near one
+  ASSERT_EQ(associate(estimate, truth).pairs.size(), 3U);
+  EXPECT_EQ(associate(estimate, truth).pairs[1].t_ns, truth[1].t_ns);
 }
 
 TEST(Association, KeepsWithinTheTolerance) {
-  const Poses truth = path(100);
-  EXPECT_EQ(associate(path(100, 50 * kMs, 500'000), truth).pairs.size(), 100U);
-  EXPECT_EQ(associate(path(100, 50 * kMs, 500'001), truth).pairs.size(), 0U);
-  EXPECT_EQ(associate(path(100, 50 * kMs, 2 * kMs), truth, 2 * kMs).pairs.size(), 100U);
-  EXPECT_EQ(associate(path(100, 50 * kMs, 2 * kMs), truth).coverage, 0.0);
+  const Poses truth = path(100, kFarApart);
+  EXPECT_EQ(associate(path(100, kFarApart, 500'000), truth).pairs.size(), 100U);
+  EXPECT_EQ(associate(path(100, kFarApart, 500'001), truth).pairs.size(), 0U);
+  EXPECT_EQ(associate(path(100, kFarApart, 2 * kMs), truth, 2 * kMs).pairs.size(), 100U);
+  EXPECT_EQ(associate(path(100, kFarApart, 2 * kMs), truth).coverage, 0.0);
 }
 
 TEST(Association, CoverageFallsWithEveryWayToMissPoses) {
@@ -153,9 +194,34 @@ TEST(Association, CoverageFallsWithEveryWayToMissPoses) {
   Poses gap = path(100);
   gap.erase(gap.begin() + 30, gap.begin() + 60);
   EXPECT_NEAR(coverage(gap), 0.7, 0.02);
-  Poses shifted = path(100);
-  for (std::size_t k = 0; k < shifted.size(); k += 2) shifted[k].t_ns += kMs;  // every other stamp meets nothing
-  EXPECT_NEAR(coverage(shifted), 0.5, 0.02);
+  EXPECT_EQ(coverage(path(100, 50 * kMs, 10'000 * kMs)), 0.0);  // another time altogether
+}
+
+TEST(TrajectoryError, StatesWhereTheTruthComesFrom) {
+  EXPECT_EQ(to_json(trajectory_errors(path(100), path(100)), Alignment::kPosyaw).at("truth"), "exact");
+  const auto json = to_json(trajectory_errors(path(99, 50 * kMs, 20 * kMs), path(100)), Alignment::kPosyaw);
+  EXPECT_EQ(json.at("truth"), "interpolated");
+  EXPECT_DOUBLE_EQ(json.at("largest_bridged_s").get<double>(), 0.05);
+}
+
+// Of the first poses and of the first seconds; what comes later drifts and must not matter.
+TEST(TrajectoryError, AlignsByTheFirst) {
+  const Poses truth = path(100);
+  Poses estimate = truth;
+  const Pose T_E_W{core::exp_quaternion(Eigen::Vector3d(0.0, 0.0, 1.0)), {5.0, 6.0, 7.0}};
+  for (std::size_t k = 0; k < estimate.size(); ++k) {
+    if (k > 20) estimate[k].T_W_B.p.x() += 1.0;
+    estimate[k].T_W_B = T_E_W * estimate[k].T_W_B;
+  }
+  for (const TrajectoryErrorOptions& options :
+       {TrajectoryErrorOptions{.first_n = 21}, TrajectoryErrorOptions{.first_s = 1.0}}) {
+    const TrajectoryErrors e = trajectory_errors(estimate, truth, options);
+    ASSERT_TRUE(e.ok) << e.reason;
+    EXPECT_LT(e.errors[20].position_m.norm(), 1e-12);
+    EXPECT_NEAR(e.errors[21].position_m.norm(), 1.0, 1e-12);
+  }
+  EXPECT_GT(trajectory_errors(estimate, truth, {.first_s = 1.06}).errors[0].position_m.norm(), 1e-3);
+  EXPECT_THROW(trajectory_errors(estimate, truth, {.first_n = 5, .first_s = 1.0}), std::invalid_argument);
 }
 
 TEST(TrajectoryError, FailsWithAReasonNeverWithZero) {
@@ -199,17 +265,9 @@ TEST(TrajectoryError, JsonTellsOkFromFailed) {
   EXPECT_FALSE(failed.contains("ate_position_m"));
 }
 
-// Twelve pairs against evo 1.36.5 and the aligner of rpg_trajectory_evaluation; the data is kept outside the
-// repository.
+// Twelve pairs against evo 1.36.5 and the aligner of rpg_trajectory_evaluation; figures to full precision.
 TEST(TrajectoryError, AgreesWithEvoAndRpg) {
-  const char* shared = std::getenv("PLUMBLINE_SHARED");
-  const std::filesystem::path root = shared != nullptr
-                                         ? std::filesystem::path(shared)
-                                         : std::filesystem::path(PLUMBLINE_SOURCE_DIR).parent_path() / "shared";
-  const std::filesystem::path folder = root / "data" / "evaluation";
-  if (!std::filesystem::exists(folder / "reference.json")) {
-    GTEST_SKIP() << "no " << folder.string() << " (set PLUMBLINE_SHARED)";
-  }
+  const std::filesystem::path folder = std::filesystem::path(PLUMBLINE_SOURCE_DIR) / "tests/data/evaluation";
   std::ifstream file(folder / "reference.json");
   const nlohmann::json reference = nlohmann::json::parse(file);
   ASSERT_EQ(reference.size(), 12U);
@@ -254,6 +312,17 @@ TEST(TrajectoryError, AgreesWithEvoAndRpg) {
       }
       for (int i = 0; i < 3; ++i) expect_near(S.t(i), rpg.at("t").at(i), fmt::format("{} {} t", pair, name));
     }
+
+    const std::vector<PosePair> pairs = pairs_of(estimate, truth);
+    const RelativeErrors one = relative_errors(pairs, {1, DeltaUnit::kFrames});
+    EXPECT_EQ(one.pairs, 299);
+    expect_statistics(one.position_m, expected.at("rpe_1frame_position_m"), pair + " 1 frame");
+    const RelativeErrors all = relative_errors(pairs, {20, DeltaUnit::kFrames});
+    EXPECT_EQ(all.pairs, 280);
+    expect_statistics(all.position_m, expected.at("rpe_20frames_position_m_all_pairs"), pair + " 20 frames");
+    const RelativeErrors some = relative_errors(pairs, {20, DeltaUnit::kFrames}, PairStarts::kConsecutive);
+    EXPECT_EQ(some.pairs, 14);
+    expect_statistics(some.rotation_deg, expected.at("rpe_20frames_rotation_deg_consecutive"), pair + " consecutive");
   }
 }
 

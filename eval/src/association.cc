@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <iterator>
+#include <limits>
+#include <optional>
 
 namespace plumbline::eval {
 namespace {
@@ -13,19 +14,9 @@ using core::StampedPose;
 using core::TimeNs;
 using Poses = std::vector<StampedPose>;
 
-bool is_before(const StampedPose& pose, TimeNs t_ns) { return pose.t_ns < t_ns; }
-
-// Of sorted, non-empty poses.
-std::size_t nearest(const Poses& poses, TimeNs t_ns) {
-  const auto after = std::lower_bound(poses.begin(), poses.end(), t_ns, is_before);
-  if (after == poses.begin()) return 0;
-  const auto index = static_cast<std::size_t>(after - poses.begin());
-  return after == poses.end() || t_ns - poses[index - 1].t_ns <= after->t_ns - t_ns ? index - 1 : index;
-}
-
-std::int64_t count_within(const Poses& poses, TimeNs first_ns, TimeNs last_ns) {
-  return std::count_if(poses.begin(), poses.end(),
-                       [&](const StampedPose& p) { return p.t_ns >= first_ns && p.t_ns <= last_ns; });
+core::Pose interpolate(const StampedPose& a, const StampedPose& b, TimeNs t_ns) {
+  const double s = core::to_seconds(t_ns - a.t_ns) / core::to_seconds(b.t_ns - a.t_ns);
+  return {a.T_W_B.q.slerp(s, b.T_W_B.q), (1.0 - s) * a.T_W_B.p + s * b.T_W_B.p};
 }
 
 TimeNs median_interval(const Poses& poses) {
@@ -37,38 +28,68 @@ TimeNs median_interval(const Poses& poses) {
   return *middle;
 }
 
+// The truth at an instant, and where it comes from.
+struct TrueAt {
+  core::Pose pose;
+  std::optional<std::size_t> index;  // of the true pose that it is; nothing where it is interpolated
+  TimeNs off_ns = 0;                 // between the instant and that pose, or between the poses interpolated
+};
+
+// `after` is the first true pose that is not before t_ns.
+std::optional<TrueAt> true_pose(const Poses& truth, std::size_t after, TimeNs t_ns, TimeNs tolerance_ns) {
+  if (after < truth.size() && truth[after].t_ns == t_ns) return TrueAt{truth[after].T_W_B, after, 0};
+  if (after > 0 && after < truth.size()) {
+    const TimeNs bridged_ns = truth[after].t_ns - truth[after - 1].t_ns;
+    if (bridged_ns <= kMaxBridgedNs) {
+      return TrueAt{interpolate(truth[after - 1], truth[after], t_ns), std::nullopt, bridged_ns};
+    }
+  }
+  const bool before_is_nearer =
+      after == truth.size() || (after > 0 && t_ns - truth[after - 1].t_ns <= truth[after].t_ns - t_ns);
+  const std::size_t nearest = before_is_nearer ? after - 1 : after;
+  const TimeNs off_ns = std::abs(t_ns - truth[nearest].t_ns);
+  return off_ns <= tolerance_ns ? std::optional(TrueAt{truth[nearest].T_W_B, nearest, off_ns}) : std::nullopt;
+}
+
+// The share of the sorted, non-empty `truth` that `pairs` cover.
+double covered_share(const std::vector<PosePair>& pairs, const Poses& truth, TimeNs tolerance_ns, TimeNs max_gap_ns) {
+  constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max() / 4;
+  std::size_t after = 0;
+  int covered = 0;
+  for (const StampedPose& t : truth) {
+    while (after < pairs.size() && pairs[after].t_ns < t.t_ns) ++after;
+    const TimeNs to_next = after < pairs.size() ? pairs[after].t_ns - t.t_ns : kNever;
+    const TimeNs to_last = after > 0 ? t.t_ns - pairs[after - 1].t_ns : kNever;
+    const bool met = std::min(to_next, to_last) <= tolerance_ns;
+    covered += met || to_next + to_last <= max_gap_ns ? 1 : 0;
+  }
+  return covered / static_cast<double>(truth.size());
+}
+
 }  // namespace
 
 Association associate(const Poses& estimate, const Poses& truth, TimeNs tolerance_ns) {
   Association result;
   if (estimate.empty() || truth.empty()) return result;
 
-  Poses matched;  // the true poses taken
-  for (const StampedPose& e : estimate) {
-    const StampedPose& t = truth[nearest(truth, e.t_ns)];
-    const TimeNs gap = std::abs(e.t_ns - t.t_ns);
-    if (gap > tolerance_ns) continue;
-    const PosePair pair{e.t_ns, e.T_W_B, t.T_W_B};
-    if (matched.empty() || matched.back().t_ns != t.t_ns) {
-      matched.push_back(t);
-      result.pairs.push_back(pair);
-    } else if (gap < std::abs(result.pairs.back().t_ns - t.t_ns)) {
-      result.pairs.back() = pair;
+  std::size_t after = 0;
+  std::optional<TrueAt> last;  // of the last pair
+  for (std::size_t k = 0; k < estimate.size(); ++k) {
+    const TimeNs t_ns = estimate[k].t_ns;
+    while (after < truth.size() && truth[after].t_ns < t_ns) ++after;
+    const auto match = true_pose(truth, after, t_ns, tolerance_ns);
+    if (!match) continue;
+    const bool rivals = last && match->index && match->index == last->index;
+    if (rivals && match->off_ns >= last->off_ns) continue;
+    if (rivals) result.pairs.pop_back();
+    result.pairs.push_back({t_ns, estimate[k].T_W_B, match->pose, k});
+    if (!match->index) {
+      ++result.interpolated;
+      result.largest_bridged_s = std::max(result.largest_bridged_s, core::to_seconds(match->off_ns));
     }
+    last = match;
   }
-  if (matched.empty()) return result;
-
-  const auto possible =
-      std::min(count_within(estimate, truth.front().t_ns - tolerance_ns, truth.back().t_ns + tolerance_ns),
-               count_within(truth, estimate.front().t_ns - tolerance_ns, estimate.back().t_ns + tolerance_ns));
-  const TimeNs max_gap_ns = 3 * median_interval(estimate);
-  const auto covered = std::count_if(truth.begin(), truth.end(), [&](const StampedPose& t) {
-    const auto after = std::lower_bound(matched.begin(), matched.end(), t.t_ns, is_before);
-    if (after == matched.end()) return false;
-    return after->t_ns == t.t_ns || (after != matched.begin() && after->t_ns - std::prev(after)->t_ns <= max_gap_ns);
-  });
-  result.coverage = std::min(static_cast<double>(matched.size()) / static_cast<double>(possible),
-                             static_cast<double>(covered) / static_cast<double>(truth.size()));
+  result.coverage = covered_share(result.pairs, truth, tolerance_ns, 3 * median_interval(estimate));
   return result;
 }
 

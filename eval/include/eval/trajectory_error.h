@@ -1,7 +1,8 @@
 // Absolute trajectory error (ATE). With S the alignment (eval/alignment.h) and pose k
 //   position  |S p_est,k - p_truth,k|                      [m]
 //   rotation  the angle of R_truth,k^T (R_S R_est,k)       [deg], in [0, 180]
-// and over k: rmse, mean, median, std (of the population, so that rmse^2 = mean^2 + std^2), min, max.
+//   yaw (absolute value), gravity: its parts               [deg], eval/attitude_error.h
+// and over k the figures of eval/error_statistics.h; the relative errors of the aligned poses: eval/relative_error.h.
 // Definitions and figures are those of evo (none, se3, sim3) and of rpg_trajectory_evaluation (posyaw).
 //
 // A run that cannot be scored is a failed run with a reason, never one with the error 0.
@@ -17,17 +18,10 @@
 #include "core/time.h"
 #include "eval/alignment.h"
 #include "eval/association.h"
+#include "eval/error_statistics.h"
+#include "eval/relative_error.h"
 
 namespace plumbline::eval {
-
-struct ErrorStatistics {
-  double rmse = 0.0;
-  double mean = 0.0;
-  double median = 0.0;
-  double std = 0.0;
-  double min = 0.0;
-  double max = 0.0;
-};
 
 // The errors of one pose after alignment, as perturbations of the truth (core/state.h).
 struct PoseError {
@@ -35,11 +29,18 @@ struct PoseError {
   Eigen::Vector3d rotation_rad;  // Log(R_truth^T R_aligned), body
 };
 
+struct AxisStatistics {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  // signed
+  Eigen::Vector3d rmse = Eigen::Vector3d::Zero();
+};
+
 struct TrajectoryErrorOptions {
   Alignment alignment = Alignment::kPosyaw;
-  int first_n = 0;  // poses that decide the alignment; 0: all
+  int first_n = 0;       // poses that decide the alignment; 0: all
+  double first_s = 0.0;  // or those up to so long after the first; 0: all. Not both.
   core::TimeNs tolerance_ns = kDefaultToleranceNs;
   double min_coverage = 0.9;
+  std::vector<Delta> deltas = {};  // of the relative errors
 };
 
 struct TrajectoryErrors {
@@ -47,10 +48,18 @@ struct TrajectoryErrors {
   std::string reason;  // where not ok
   int matched = 0;
   double coverage = 0.0;
+  int interpolated = 0;  // pairs whose truth was interpolated, over intervals of at most
+  double largest_bridged_s = 0.0;
   Similarity truth_from_estimate;
   ErrorStatistics position_m;
   ErrorStatistics rotation_deg;
-  std::vector<PoseError> errors;  // one a matched pose
+  ErrorStatistics yaw_deg;
+  ErrorStatistics gravity_deg;
+  AxisStatistics position_axes_m;        // x, y, z of the world
+  AxisStatistics rotation_axes_deg;      // of the body
+  std::vector<RelativeErrors> relative;  // one a delta
+  std::vector<PosePair> pairs;           // before alignment
+  std::vector<PoseError> errors;         // one a pair
 };
 
 inline constexpr int kMinPoses = 3;
@@ -64,10 +73,11 @@ TrajectoryErrors trajectory_errors(const std::vector<core::StampedPose>& estimat
                                    const std::vector<core::StampedPose>& truth,
                                    const TrajectoryErrorOptions& options = {});
 
-ErrorStatistics error_statistics(const std::vector<double>& errors);  // not empty
-
-// {"ok", "alignment", "matched", "coverage", "ate_position_m": {...}, "ate_rotation_deg": {...}}; of a failed run
-// {"ok", "reason", "alignment", "matched", "coverage"}.
+// {"ok", "alignment", "matched", "coverage", "truth", "largest_bridged_s", "ate_position_m": {...}, "ate_rotation_deg",
+//  "ate_yaw_deg", "ate_gravity_deg", "axes": {"position_m": {"mean": [x, y, z], "rmse"}, "rotation_deg"}, "rpe":
+//  [...]};
+// of a failed run {"ok", "reason", "alignment", "matched", "coverage"}. truth is "exact" where every pair has a true
+// pose of its stamp, else "interpolated".
 nlohmann::ordered_json to_json(const TrajectoryErrors& errors, Alignment alignment);
 
 }  // namespace plumbline::eval
