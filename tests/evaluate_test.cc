@@ -8,6 +8,7 @@
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "core/lie.h"
 #include "core/state.h"

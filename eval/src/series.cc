@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include <nlohmann/json.hpp>
+
 namespace plumbline::eval {
 namespace {
 

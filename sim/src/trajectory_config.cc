@@ -38,6 +38,10 @@ std::optional<core::RuleViolation> validate(const TrajectoryConfig& c) {
   if (c.type == TrajectoryType::kSpline && c.file.empty()) {
     return core::RuleViolation{"file", "a spline needs a pose file"};
   }
+  if (c.type == TrajectoryType::kSpline &&
+      (!std::filesystem::exists(c.file) || std::filesystem::is_directory(c.file))) {
+    return core::RuleViolation{"file", "no such file: " + c.file.generic_string()};
+  }
   return std::nullopt;
 }
 

@@ -167,7 +167,9 @@ Plan make_plan(ConfigTree root, const std::vector<Axis>& axes, const std::string
   std::string& name = plan.base.experiment.name;
   if (name.empty()) name = default_name;
   if (name.find('/') != std::string::npos || name == "." || name == "..") {
-    throw core::ConfigError(fmt::format("experiment.name: must be a plain name, got '{}'", name));
+    const ConfigTree* value = core::find_value(root, "experiment.name");
+    throw core::config_error(value != nullptr ? value->origin : root.origin, "experiment.name",
+                             fmt::format("must be a plain name, got '{}'", name));
   }
   add_cells(root, axes, 0, ordered_json::object(), plan.cells);
   std::string hashes;
