@@ -54,7 +54,7 @@ struct Bundle {
 };
 
 template <class Factor, class Block>
-ceres::Solver::Summary solve(core::BalProblem& bal, Bundle<Factor, Block>& bundle, const ceres::Manifold* manifold,
+ceres::Solver::Summary solve(core::BalProblem& bal, Bundle<Factor, Block>& bundle, ceres::Manifold* manifold,
                              ceres::Solver::Options options) {
   ceres::Problem::Options problem_options;
   problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -74,7 +74,7 @@ ceres::Solver::Summary solve(core::BalProblem& bal, Bundle<Factor, Block>& bundl
   for (Block& camera : bundle.cameras) {
     order(camera.data(), 1);
     if (manifold != nullptr && problem.HasParameterBlock(camera.data())) {
-      problem.SetManifold(camera.data(), const_cast<ceres::Manifold*>(manifold));
+      problem.SetManifold(camera.data(), manifold);
     }
   }
   ceres::Solver::Summary summary;
@@ -89,7 +89,7 @@ ceres::Solver::Summary solve(core::BalProblem& bal, BundleRotation rotation, con
     for (const core::BalCamera& camera : bal.cameras) bundle.cameras.push_back(pack(camera));
     return solve(bal, bundle, nullptr, options);
   }
-  const BalLeftCameraManifold manifold;
+  BalLeftCameraManifold manifold;
   Bundle<BalLeftFactor, BalLeftCameraBlock> bundle;
   for (const core::BalCamera& camera : bal.cameras) bundle.cameras.push_back(pack_left(camera));
   return solve(bal, bundle, &manifold, options);
