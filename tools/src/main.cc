@@ -9,6 +9,7 @@
 #include <glog/logging.h>
 
 #include "core/error.h"
+#include "tools/ba_command.h"
 #include "tools/commands.h"
 #include "tools/version.h"
 
@@ -77,6 +78,38 @@ int parse_and_run(int argc, char** argv) {
   replay_command->add_option("RUN_ID", replay_options.run_id, "as in results.jsonl")->required();
   replay_command->add_option("--out", replay_options.out, "write dataset, estimate and series there");
 
+  BaOptions ba_options;
+  CLI::App* ba_command = app.add_subcommand("ba", "adjust a bundle: a problem file of BAL");
+  ba_command->add_option("PROBLEM", ba_options.problem, "BAL file, plain or bzip2")->required();
+  ba_command
+      ->add_option("--solver", ba_options.adjustment.solver, "automatic, dense_schur, sparse_schur, iterative_schur")
+      ->transform(
+          CLI::CheckedTransformer(words<plumbline::estimator::BundleSolver>(plumbline::estimator::kBundleSolverNames)));
+  ba_command
+      ->add_option("--rotation", ba_options.adjustment.rotation, "perturbation: angle_axis (as in the file) or left")
+      ->transform(CLI::CheckedTransformer(
+          words<plumbline::estimator::BundleRotation>(plumbline::estimator::kBundleRotationNames)));
+  ba_command->add_option("--iterations", ba_options.adjustment.max_iterations, "at most so many steps")
+      ->check(CLI::PositiveNumber);
+  ba_command->add_option("--threads", ba_options.adjustment.threads, "threads of the solver")
+      ->check(CLI::PositiveNumber);
+  ba_command->add_option("--truth", ba_options.truth,
+                         "true cameras and points (BAL file), compared after Sim3 alignment");
+  ba_command->add_option("--out", ba_options.out, "write the adjusted problem; compressed where it ends in .bz2");
+  ba_command->add_flag("--json", ba_options.json, "print JSON");
+
+  SimulateBaOptions simulate_ba_options;
+  plumbline::sim::BalWorldConfig& bal_world = simulate_ba_options.world;
+  CLI::App* simulate_ba_command =
+      app.add_subcommand("simulate-ba", "write a bundle problem and its truth as BAL files");
+  simulate_ba_command->add_option("--out", simulate_ba_options.out, "folder for problem.txt and truth.txt")->required();
+  simulate_ba_command->add_option("--seed", simulate_ba_options.seed, "seed of all draws");
+  simulate_ba_command->add_option("--cameras", bal_world.cameras, "cameras on a ring")->check(CLI::Range(3, 100000));
+  simulate_ba_command->add_option("--points", bal_world.points, "points inside the ring")
+      ->check(CLI::Range(10, 100000000));
+  simulate_ba_command->add_option("--pixel-sigma-px", bal_world.pixel_sigma_px, "noise of an observation")
+      ->check(CLI::NonNegativeNumber);
+
   CheckOptions check_options;
   CLI::App* check_command = app.add_subcommand("check", "check configuration files");
   check_command->add_option("CONFIG", check_options.files, "experiments, scenarios or estimators");
@@ -93,6 +126,8 @@ int parse_and_run(int argc, char** argv) {
   if (*estimate_command) return estimate(estimate_options);
   if (*evaluate_command) return evaluate(evaluate_options);
   if (*replay_command) return replay(replay_options);
+  if (*ba_command) return ba(ba_options);
+  if (*simulate_ba_command) return simulate_ba(simulate_ba_options);
   return check(check_options);
 }
 
