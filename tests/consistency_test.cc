@@ -9,7 +9,7 @@
 #include "estimator/factors/imu_factor.h"
 #include "estimator/factors/point_factors.h"
 #include "estimator/keyframes.h"
-#include "sim/camera_sensor.h"
+#include "sim/frame_view.h"
 #include "sim/simulate.h"
 
 namespace plumbline {

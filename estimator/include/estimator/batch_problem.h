@@ -14,6 +14,7 @@
 #include "estimator/factors/local_motion.h"
 #include "estimator/factors/parameter_blocks.h"
 #include "estimator/keyframes.h"
+#include "estimator/point_terms.h"
 
 namespace plumbline::estimator {
 
@@ -61,6 +62,9 @@ class BatchProblem {
   void add_priors();
   void add_inertial_factors();
   void add_points();
+  bool add_point(const PointModel& model, const std::vector<FrameTiming>& timings, const Track& track,
+                 Eigen::Vector3d& landmark);
+  double* landmark_block(Eigen::Vector3d& landmark) const;  // what of it is estimated
 
   const BatchInput& input_;
   BatchValues start_;
