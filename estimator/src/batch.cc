@@ -126,7 +126,7 @@ core::EstimateLog estimate_batch(const core::MeasurementLog& log, const Estimato
                    .keyframes = {},
                    .tracks = {}};
   input.keyframes = select_keyframes(log.frames, config.keyframe_rate_hz);
-  input.tracks = collect_tracks(log.frames, input.keyframes);
+  input.tracks = collect_tracks(log.frames, input.keyframes, log.camera);
   if (input.keyframes.size() < 2) return failed("fewer than two keyframes");
   if (log.imu.size() < 2 || log.imu.front().t_ns > log.prior.t_ns) return failed("no IMU samples at the prior's time");
 

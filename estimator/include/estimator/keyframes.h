@@ -24,7 +24,9 @@ struct Track {
   std::vector<TrackObservation> observations;
 };
 
-// Tracks that at least two keyframes see (a point that is seen once says nothing of the motion), by their ids.
-std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes);
+// Tracks that at least two keyframes see (a point that is seen once says nothing of the motion), by their ids. Without
+// the observations at pixels that no ray of the camera falls on.
+std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes,
+                                  const core::PinholeCamera& camera);
 
 }  // namespace plumbline::estimator
