@@ -277,7 +277,7 @@ TEST(Keyframes, RateAndTracks) {
   ASSERT_EQ(keyframes.size(), 20U);
   for (std::size_t i = 0; i < keyframes.size(); ++i) EXPECT_EQ(keyframes[i], 2 * i);
   EXPECT_EQ(estimator::select_keyframes(frames, 100.0).size(), frames.size());
-  const auto tracks = estimator::collect_tracks(frames, keyframes);
+  const auto tracks = estimator::collect_tracks(frames, keyframes, {});
   ASSERT_EQ(tracks.size(), 1U);  // track 5 is in one keyframe only
   EXPECT_EQ(tracks.front().id, 6);
   EXPECT_EQ(tracks.front().observations.front().keyframe, 1U);

@@ -35,6 +35,7 @@ ScenarioConfig some_config() {
 struct Scene {
   ScenarioConfig config;
   std::unique_ptr<const Trajectory> trajectory;
+  World world;
   std::vector<Eigen::Vector3d> landmarks;
   core::RigCalibration calibration;
   CameraRecording recording;
@@ -42,9 +43,10 @@ struct Scene {
   explicit Scene(const ScenarioConfig& c, core::TrialId id = kId)
       : config(c),
         trajectory(make_trajectory(c.trajectory, c.duration_s, id)),
-        landmarks(make_world(c, *trajectory, id).points_W),
+        world(make_world(c, *trajectory, id)),
+        landmarks(world.points_W),
         calibration(c.calibration()),
-        recording(simulate_camera(*trajectory, landmarks, c, kLeadS, id)) {}
+        recording(simulate_camera(*trajectory, world, c, kLeadS, id)) {}
 
   int landmark_of(const core::PointObservation& point) const { return recording.track_landmark.at(point.track_id); }
 
@@ -55,6 +57,11 @@ struct Scene {
   Eigen::Vector2d pixel_at(double t_imu_s, int landmark) const {
     const Eigen::Vector2d none = Eigen::Vector2d::Constant(std::nan(""));
     return config.camera.model.project(in_camera(t_imu_s, landmark)).value_or(none);
+  }
+
+  FrameView view(double t_cam_s) const {
+    const core::PinholeCamera& camera = config.camera.model;
+    return {*trajectory, camera, calibration, half_angle_of_view_rad(camera), t_cam_s};
   }
 
   template <class F>
@@ -128,7 +135,7 @@ TEST(CameraSensor, LaterRowsAreExposedLater) {
   ScenarioConfig config = some_config();
   config.camera.readout_s = 0.03;
   const Scene scene(config);
-  const FrameView view(*scene.trajectory, config.camera.model, scene.calibration, 1.0);
+  const FrameView view = scene.view(1.0);
   std::vector<Exposure> exposures;
   for (const Eigen::Vector3d& P_W : scene.landmarks) {
     const auto exposure = view.expose(P_W);
@@ -146,7 +153,7 @@ TEST(CameraSensor, LaterRowsAreExposedLater) {
 
 TEST(CameraSensor, GlobalShutterExposesAllRowsAtOnce) {
   const Scene scene(some_config());
-  const FrameView view(*scene.trajectory, scene.config.camera.model, scene.calibration, 1.0);
+  const FrameView view = scene.view(1.0);
   int n = 0;
   for (const Eigen::Vector3d& P_W : scene.landmarks) {
     const auto exposure = view.expose(P_W);
@@ -228,7 +235,7 @@ TEST(CameraSensor, SeesWhatIsInThePictureAndInRange) {
       EXPECT_TRUE(seen.insert(scene.landmark_of(point)).second) << "twice in a frame";
     }
     std::set<int> expected;
-    const FrameView view(*scene.trajectory, config.camera.model, scene.calibration, core::to_seconds(frame.t_cam_ns));
+    const FrameView view = scene.view(core::to_seconds(frame.t_cam_ns));
     for (int i = 0; i < config.world.landmarks; ++i) {
       const auto exposure = view.expose(scene.landmarks[static_cast<std::size_t>(i)]);
       if (!exposure || !config.camera.model.contains(exposure->pixel)) continue;

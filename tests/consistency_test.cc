@@ -110,7 +110,7 @@ TEST(Consistency, PointResidualsAtTheTruthAreTheSimulatedPixelNoise) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   int n = 0;
-  for (const estimator::Track& track : estimator::collect_tracks(log.frames, keyframes)) {
+  for (const estimator::Track& track : estimator::collect_tracks(log.frames, keyframes, log.camera)) {
     const std::size_t anchor = track.observations.front().keyframe;
     const Eigen::Vector3d& P_W = s.truth.landmarks_W[static_cast<std::size_t>(s.truth.track_landmark.at(track.id))];
     const sim::FrameView view(*trajectory, log.camera, rig, core::to_seconds(log.frames[keyframes[anchor]].t_cam_ns));

@@ -30,6 +30,7 @@ ScenarioConfig some_config() {
   config.imu.accel_bias_m_s2 = {0.05, -0.08, 0.03};
   config.camera.td_s = 0.02;
   config.camera.readout_s = 0.03;
+  config.camera.model.distortion = {core::DistortionModel::kRadtan, {-0.283, 0.074, 2e-4, 2e-5}};
   config.world.landmarks = 500;
   config.points.per_frame = 30;
   config.points.loss_probability = 0.05;
@@ -83,6 +84,8 @@ void expect_same(const core::MeasurementLog& a, const core::MeasurementLog& b) {
   EXPECT_EQ(a.camera.fy_px, b.camera.fy_px);
   EXPECT_EQ(a.camera.cx_px, b.camera.cx_px);
   EXPECT_EQ(a.camera.cy_px, b.camera.cy_px);
+  EXPECT_EQ(a.camera.distortion.model(), b.camera.distortion.model());
+  EXPECT_EQ(a.camera.distortion.coefficients(), b.camera.distortion.coefficients());
   EXPECT_EQ(a.imu_noise.gyro_noise_density, b.imu_noise.gyro_noise_density);
   EXPECT_EQ(a.imu_noise.gyro_bias_walk, b.imu_noise.gyro_bias_walk);
   EXPECT_EQ(a.imu_noise.accel_noise_density, b.imu_noise.accel_noise_density);
@@ -310,6 +313,16 @@ TEST_F(Dataset, NamesTheLineOfABrokenRow) {
   EXPECT_THAT(refusal_of(kPoints, 5, frame + ",3,1"), HasSubstr("mav0/cam0/points.csv:5: "));
   EXPECT_THAT(refusal_of(kPoints, 5, frame + ",0.5,1,1"), HasSubstr("mav0/cam0/points.csv:5: "));
   EXPECT_EQ(refusal(), "accepted");
+}
+
+TEST_F(Dataset, VelocitiesMayBeAbsentButNotHalf) {
+  const std::string frame = std::to_string(simulation_.measurements.frames.front().t_cam_ns);
+  EXPECT_EQ(refusal_of(kPoints, 5, frame + ",3,1,1"), "accepted");
+  EXPECT_EQ(refusal_of(kPoints, 5, frame + ",3,1,1,,"), "accepted");
+  EXPECT_EQ(refusal_of(kPoints, 5, frame + ",3,1,1,0.5,-0.5"), "accepted");
+  for (const char* row : {",3,1,1,0.5,", ",3,1,1,,0.5", ",3,1,1,0.5", ",3,1,1,0.5,nan"}) {
+    EXPECT_THAT(refusal_of(kPoints, 5, frame + row), HasSubstr("mav0/cam0/points.csv:5: ")) << row;
+  }
 }
 
 TEST_F(Dataset, RefusesStampsOutOfOrder) {

@@ -73,12 +73,12 @@ TEST(ImageVelocity, ATrackThatSkipsAFrameStartsAnew) {
 TEST(ImageVelocity, ExactIsTheDerivativeAtTheExposure) {
   const ScenarioConfig config = some_config(VelocitySource::kExact);
   const auto trajectory = make_trajectory(config.trajectory, config.duration_s, kId);
-  const auto landmarks = make_world(config.world, *trajectory, config.duration_s, kId);
+  const World world = make_world(config, *trajectory, kId);
   const core::RigCalibration calibration = config.calibration();
-  const CameraRecording recording = simulate_camera(*trajectory, landmarks, config, 0.25, kId);
+  const CameraRecording recording = simulate_camera(*trajectory, world, config, 0.25, kId);
   const auto normalised = [&](double t_s, int landmark) -> Eigen::Vector2d {
     const core::Pose T_W_C = trajectory->pose_at(t_s) * calibration.T_B_C;
-    const Eigen::Vector3d P_C = T_W_C.inverse() * landmarks[static_cast<std::size_t>(landmark)];
+    const Eigen::Vector3d P_C = T_W_C.inverse() * world.points_W[static_cast<std::size_t>(landmark)];
     return P_C.head<2>() / P_C.z();
   };
   constexpr double kStepS = 1e-3;

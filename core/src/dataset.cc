@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/camera_config.h"
 #include "core/csv.h"
 #include "core/error.h"
 
@@ -56,12 +57,7 @@ void visit(ConfigVisitor& v, ImuSensorFile& c) {
 }
 
 void visit(ConfigVisitor& v, CameraSensorFile& c) {
-  v.value("width_px", c.model.width_px, at_least(1), "columns");
-  v.value("height_px", c.model.height_px, at_least(1), "rows");
-  v.value("fx_px", c.model.fx_px, positive(), "focal length");
-  v.value("fy_px", c.model.fy_px, positive(), "focal length");
-  v.value("cx_px", c.model.cx_px, any(), "principal point");
-  v.value("cy_px", c.model.cy_px, any(), "principal point");
+  visit(v, c.model);
   v.value("pixel_sigma_px", c.pixel_sigma_px, non_negative(), "noise of u and v");
 }
 

@@ -130,7 +130,7 @@ core::EstimateLog estimate_batch(const core::MeasurementLog& log, const Estimato
                    .keyframes = {},
                    .tracks = {}};
   input.keyframes = select_keyframes(log.frames, config.keyframe_rate_hz);
-  input.tracks = collect_tracks(log.frames, input.keyframes);
+  input.tracks = collect_tracks(log.frames, input.keyframes, log.camera);
   if (config.timing == TimingModel::kFeatureVelocity && drop_without_velocity(input.tracks) > 0 &&
       input.tracks.empty()) {
     return failed("no track has the image velocities that estimator.timing = feature_velocity needs");

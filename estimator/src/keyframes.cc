@@ -20,10 +20,12 @@ std::vector<std::size_t> select_keyframes(const std::vector<core::Frame>& frames
   return keyframes;
 }
 
-std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes) {
+std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes,
+                                  const core::PinholeCamera& camera) {
   std::map<std::int64_t, Track> by_id;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
     for (const core::PointObservation& point : frames[keyframes[k]].points) {
+      if (!camera.try_unproject(point.pixel)) continue;
       Track& track = by_id[point.track_id];
       track.id = point.track_id;
       track.observations.push_back({k, point.pixel, point.velocity});

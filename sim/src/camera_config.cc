@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/camera_config.h"
+
 namespace plumbline::sim {
 
 using core::any;
@@ -12,16 +14,28 @@ using core::probability;
 
 void visit(core::ConfigVisitor& v, CameraConfig& c) {
   v.value("rate_hz", c.rate_hz, core::between(0.1, 1000.0), "frames a second");
-  v.value("width_px", c.model.width_px, at_least(1), "columns");
-  v.value("height_px", c.model.height_px, at_least(1), "rows");
-  v.value("fx_px", c.model.fx_px, positive(), "focal length, horizontal");
-  v.value("fy_px", c.model.fy_px, positive(), "focal length, vertical");
-  v.value("cx_px", c.model.cx_px, any(), "principal point; (0, 0) is the centre of the upper left pixel");
-  v.value("cy_px", c.model.cy_px, any(), "principal point");
+  core::visit(v, c.model);
   v.value("td_s", c.td_s, core::between(-1.0, 1.0), "time offset, t_imu = t_cam + td");
   v.choice("td_reference_row", c.td_reference_row, core::kRowReferenceNames, "the row that td_s speaks of");
   v.value("readout_s", c.readout_s, core::between(0.0, 1.0), "from the first row to the last; 0 is a global shutter");
-  v.value("pixel_sigma_px", c.pixel_sigma_px, non_negative(), "Gaussian noise of u and v");
+  v.value("exposure_s", c.exposure_s, core::between(0.0, 1.0), "of a row");
+  v.choice("exposure_stamp", c.exposure_stamp, kExposureStampNames,
+           "what stamps refer to; with `start` td is td_s + exposure_s / 2, since a row shows its mid exposure");
+  v.value("trigger_jitter_s", c.trigger_jitter_s, core::between(0.0, 0.02),
+          "sigma of the true frame times, which the stamps follow; cut at 4 sigma");
+  v.value("stamp_jitter_s", c.stamp_jitter_s, core::between(0.0, 0.02),
+          "sigma of the stamps about the true frame times; cut at 4 sigma");
+  v.value("drop_probability", c.drop_probability, probability(), "that a frame is lost; its tracks run on");
+  v.value("pixel_sigma_px", c.pixel_sigma_px, non_negative(), "noise of u and v");
+  v.value("pixel_noise_dof", c.pixel_noise_dof, core::Range{.lower = 2.0, .lower_open = true}, "normal",
+          "Student's t of so many degrees of freedom, of the same variance");
+  v.value("pixel_noise_correlation", c.pixel_noise_correlation,
+          core::Range{.lower = 0.0, .upper = 1.0, .upper_open = true},
+          "of the noise of a track in consecutive frames, first-order autoregressive");
+  v.value("gross_outlier_probability", c.gross_outlier_probability, probability(), "that an observation is far off");
+  v.value("gross_outlier_sigma_px", c.gross_outlier_sigma_px, non_negative(), "how far, u and v, on top of the noise");
+  v.value("uniform_outlier_probability", c.uniform_outlier_probability, probability(),
+          "that an observation is anywhere in the picture");
   v.value("extrinsic_position_m", c.extrinsic_position_m, any(), "p_B_C, the camera in the body");
   v.value("extrinsic_rotation_xyzw", c.extrinsic_rotation_xyzw, core::between(-1.0, 1.0),
           "R_B_C as a unit quaternion; the default looks along the body's x axis");
@@ -41,7 +55,14 @@ std::optional<core::RuleViolation> validate(const CameraConfig& c) {
   if (std::abs(c.extrinsic_rotation_xyzw.norm() - 1.0) > 1e-3) {
     return core::RuleViolation{"extrinsic_rotation_xyzw", "must be a unit quaternion"};
   }
-  return std::nullopt;
+  // Four sigma of both must leave the frames in order.
+  if ((c.trigger_jitter_s + c.stamp_jitter_s) * c.rate_hz > 0.1) {
+    const bool trigger = c.trigger_jitter_s > c.stamp_jitter_s;
+    return core::RuleViolation{trigger ? "trigger_jitter_s" : "stamp_jitter_s",
+                               "must be <= a tenth of the interval, 0.1 / rate_hz, both jitters together"};
+  }
+  if (c.exposure_s * c.rate_hz > 1.0) return core::RuleViolation{"exposure_s", "must be <= 1 / rate_hz"};
+  return core::validate(c.model);
 }
 
 std::optional<core::RuleViolation> validate(const PointsConfig& c) {

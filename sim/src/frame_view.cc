@@ -6,8 +6,30 @@
 
 namespace plumbline::sim {
 
+double half_angle_of_view_rad(const core::PinholeCamera& camera) {
+  // The corners are furthest from the axis but for the tangential part of a lens, which the border's other pixels and
+  // the margin cover.
+  constexpr int kSteps = 16;
+  constexpr double kMargin = 1.02;
+  constexpr double kAll = 0.5 * std::numbers::pi;
+  double half_angle = 0.0;
+  const auto cover = [&](double u, double v) {
+    const auto bearing = camera.try_unproject({u, v});
+    half_angle = std::max(half_angle, bearing ? kMargin * std::acos(1.0 / bearing->norm()) : kAll);
+  };
+  for (int i = 0; i <= kSteps; ++i) {
+    const double u = camera.width_px * static_cast<double>(i) / kSteps - 0.5;
+    const double v = camera.height_px * static_cast<double>(i) / kSteps - 0.5;
+    cover(u, -0.5);
+    cover(u, camera.height_px - 0.5);
+    cover(-0.5, v);
+    cover(camera.width_px - 0.5, v);
+  }
+  return std::min(half_angle, kAll);
+}
+
 FrameView::FrameView(const Trajectory& trajectory, const core::PinholeCamera& camera,
-                     const core::RigCalibration& calibration, double t_cam_s)
+                     const core::RigCalibration& calibration, double half_angle_rad, double t_cam_s)
     : trajectory_(trajectory), camera_(camera), calibration_(calibration), t_middle_s_(t_cam_s + calibration.td_s) {
   const Kinematics k = trajectory.at(t_middle_s_);
   const core::Pose T_W_C = k.T_W_B * calibration.T_B_C;
@@ -16,19 +38,11 @@ FrameView::FrameView(const Trajectory& trajectory, const core::PinholeCamera& ca
   v_C_ = T_C_W_middle_.q * v_W;
   omega_C_ = calibration.T_B_C.q.conjugate() * k.omega_B;
 
-  double half_angle = 0.0;
-  for (const double u : {-0.5, camera.width_px - 0.5}) {
-    for (const double v : {-0.5, camera.height_px - 0.5}) {
-      const Eigen::Vector3d corner = camera.unproject({u, v});
-      half_angle = std::max(half_angle, std::acos(1.0 / corner.norm()));
-    }
-  }
   // Twice the motion that the middle row's speed and rate predict, so that their change is covered.
   const double half_readout_s = 0.5 * std::abs(calibration.readout_s);
   turn_rad_ = 2.0 * omega_C_.norm() * half_readout_s;
-  half_angle += turn_rad_;
   reach_m_ = 2.0 * v_C_.norm() * half_readout_s;
-  cos_half_angle_ = std::cos(std::min(half_angle, std::numbers::pi));
+  cos_half_angle_ = std::cos(std::min(half_angle_rad + turn_rad_, std::numbers::pi));
 }
 
 core::Pose FrameView::camera_pose_at(double t_imu_s) const { return trajectory_.pose_at(t_imu_s) * calibration_.T_B_C; }
@@ -59,12 +73,13 @@ std::optional<Exposure> FrameView::expose(const Eigen::Vector3d& P_W) const {
   double v = middle_row + (middle->y() - middle_row) / slope;
   for (int i = 0; i < kMaxIterations; ++i) {
     const double t = t_middle_s_ + (v - middle_row) * s_per_row;
-    const Eigen::Vector3d P_C = camera_pose_at(t).inverse() * P_W;
+    const core::Pose T_W_C = camera_pose_at(t);
+    const Eigen::Vector3d P_C = T_W_C.inverse() * P_W;
     const auto pixel = camera_.project(P_C);
     if (!pixel) return std::nullopt;
     const double defect = pixel->y() - v;
     if (std::abs(defect * s_per_row) < kToleranceS) {
-      return Exposure{.pixel = *pixel, .t_imu_s = t, .depth_m = P_C.z()};
+      return Exposure{.pixel = *pixel, .t_imu_s = t, .depth_m = P_C.z(), .camera_W = T_W_C.p};
     }
     v += defect / slope;
   }

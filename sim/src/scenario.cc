@@ -7,8 +7,10 @@ namespace plumbline::sim {
 
 core::RigCalibration ScenarioConfig::calibration() const {
   const Eigen::Quaterniond q(Eigen::Vector4d(camera.extrinsic_rotation_xyzw));
+  // A row shows the middle of its exposure, which is later than a stamp of its start.
+  const double shown_s = camera.exposure_stamp == ExposureStamp::kStart ? 0.5 * camera.exposure_s : 0.0;
   return {.T_B_C = {q.normalized(), camera.extrinsic_position_m},
-          .td_s = core::td_middle_from(camera.td_s, camera.readout_s, camera.td_reference_row),
+          .td_s = core::td_middle_from(camera.td_s, camera.readout_s, camera.td_reference_row) + shown_s,
           .readout_s = camera.readout_s};
 }
 
@@ -29,6 +31,7 @@ std::optional<core::RuleViolation> validate(const ScenarioConfig& c) {
     return violation;
   };
   if (auto violation = in("trajectory", validate(c.trajectory))) return violation;
+  if (auto violation = in("imu", validate(c.imu))) return violation;
   if (auto violation = in("camera", validate(c.camera))) return violation;
   if (auto violation = in("world", validate(c.world))) return violation;
   return in("points", validate(c.points));

@@ -14,14 +14,14 @@ Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
   const auto trajectory = make_trajectory(config.trajectory, config.duration_s, id);
   World world = make_world(config, *trajectory, id);
   ImuRecording imu = simulate_imu(*trajectory, config.imu, config.gravity_m_s2, config.duration_s, id);
-  CameraRecording camera = simulate_camera(*trajectory, world.points_W, config, kCameraLeadS, id);
+  CameraRecording camera = simulate_camera(*trajectory, world, config, kCameraLeadS, id);
 
   Simulation s;
   s.truth.calibration = config.calibration();
-  s.truth.states.reserve(imu.samples.size());
-  for (std::size_t i = 0; i < imu.samples.size(); ++i) {
-    const Kinematics k = trajectory->at(core::to_seconds(imu.samples[i].t_ns));
-    s.truth.states.push_back({imu.samples[i].t_ns, {.T_W_B = k.T_W_B, .v_W = k.v_W, .bias = imu.biases[i]}});
+  s.truth.states.reserve(imu.stamps_ns.size());
+  for (std::size_t i = 0; i < imu.stamps_ns.size(); ++i) {
+    const Kinematics k = trajectory->at(core::to_seconds(imu.stamps_ns[i]));
+    s.truth.states.push_back({imu.stamps_ns[i], {.T_W_B = k.T_W_B, .v_W = k.v_W, .bias = imu.biases[i]}});
   }
   s.truth.landmarks_W = std::move(world.points_W);
   s.truth.track_landmark = std::move(camera.track_landmark);

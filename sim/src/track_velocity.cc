@@ -17,7 +17,9 @@ void add_finite_difference_velocities(std::vector<core::Frame>& frames, const co
   for (core::Frame& frame : frames) {
     std::map<std::int64_t, Seen> now;
     for (core::PointObservation& point : frame.points) {
-      const Eigen::Vector2d normalised = camera.unproject(point.pixel).head<2>();
+      const auto bearing = camera.try_unproject(point.pixel);
+      if (!bearing) continue;
+      const Eigen::Vector2d normalised = bearing->head<2>();
       now.insert({point.track_id, {&point, normalised}});
       const auto last = before.find(point.track_id);
       if (last == before.end()) continue;

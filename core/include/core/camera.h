@@ -1,10 +1,13 @@
-// Pinhole camera. x right, y down, z forward; pixel (0, 0) is the centre of the upper left pixel.
-//   u = fx x/z + cx,  v = fy y/z + cy          v is the row that a rolling shutter reads out (docs/conventions.md)
+// Pinhole camera behind a lens. x right, y down, z forward; pixel (0, 0) is the centre of the upper left pixel.
+//   (x, y) = (X/Z, Y/Z) -> (x_d, y_d) by the lens (core/distortion.h)
+//   u = fx x_d + cx,  v = fy y_d + cy          v is the row that a rolling shutter reads out (docs/conventions.md)
 #pragma once
 
 #include <optional>
 
 #include <Eigen/Core>
+
+#include "core/distortion.h"
 
 namespace plumbline::core {
 
@@ -15,23 +18,18 @@ struct PinholeCamera {
   double fy_px = 460.0;
   double cx_px = 319.5;
   double cy_px = 239.5;
+  Distortion distortion = {};  // NOLINT(readability-redundant-member-init): g++ warns of designated lists without it
 
   // Pixel of the point P_C in the camera frame (any positive scale of it will do, since only the direction counts);
-  // nothing for a point that is not in front of the camera. J, if given, is d(u, v)/dP_C.
-  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& P_C, Eigen::Matrix<double, 2, 3>* J = nullptr) const {
-    // Nearer than a millionth of its lateral distance to the image plane is not in front of any real camera.
-    if (!(P_C.z() > 1e-6 * P_C.head<2>().norm()) || !(P_C.z() > 0.0)) return std::nullopt;
-    const double inv_z = 1.0 / P_C.z();
-    const double x = P_C.x() * inv_z;
-    const double y = P_C.y() * inv_z;
-    if (J != nullptr) *J << fx_px * inv_z, 0.0, -fx_px * x * inv_z, 0.0, fy_px * inv_z, -fy_px * y * inv_z;
-    return Eigen::Vector2d(fx_px * x + cx_px, fy_px * y + cy_px);
-  }
+  // nothing for a point that is not in front of the camera or beyond the fold of its lens. J, if given, is
+  // d(u, v)/dP_C.
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& P_C, Eigen::Matrix<double, 2, 3>* J = nullptr) const;
 
-  // The point (x, y, 1) of the normalised plane that the pixel sees.
-  Eigen::Vector3d unproject(const Eigen::Vector2d& pixel) const {
-    return {(pixel.x() - cx_px) / fx_px, (pixel.y() - cy_px) / fy_px, 1.0};
-  }
+  // The point (x, y, 1) of the normalised plane that the pixel sees; nothing where no ray falls on the pixel.
+  std::optional<Eigen::Vector3d> try_unproject(const Eigen::Vector2d& pixel) const;
+
+  // The same for a pixel that some ray falls on, as on all of them without a lens; throws std::domain_error for others.
+  Eigen::Vector3d unproject(const Eigen::Vector2d& pixel) const;
 
   bool contains(const Eigen::Vector2d& pixel) const {
     return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < width_px - 0.5 && pixel.y() < height_px - 0.5;

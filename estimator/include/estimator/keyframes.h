@@ -26,8 +26,10 @@ struct Track {
   std::vector<TrackObservation> observations;
 };
 
-// Tracks that at least two keyframes see (a point that is seen once says nothing of the motion), by their ids.
-std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes);
+// Tracks that at least two keyframes see (a point that is seen once says nothing of the motion), by their ids. Without
+// the observations at pixels that no ray of the camera falls on.
+std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes,
+                                  const core::PinholeCamera& camera);
 
 // Leaves out the observations without an image velocity, and with them the tracks that fewer than two are left of:
 // taking 0 for a velocity that is not known would be a wrong one. Returns how many observations had none.

@@ -14,13 +14,27 @@
 
 namespace plumbline::sim {
 
+// What a frame's stamp refers to, of the exposure of its middle row.
+enum class ExposureStamp { kMiddle, kStart };
+inline constexpr std::array<std::string_view, 2> kExposureStampNames = {"middle", "start"};
+
 struct CameraConfig {
   double rate_hz = 20.0;
   core::PinholeCamera model;
   double td_s = 0.0;
   core::RowReference td_reference_row = core::RowReference::kMiddle;
   double readout_s = 0.0;
+  double exposure_s = 0.0;
+  ExposureStamp exposure_stamp = ExposureStamp::kMiddle;
+  double trigger_jitter_s = 0.0;
+  double stamp_jitter_s = 0.0;
+  double drop_probability = 0.0;
   double pixel_sigma_px = 1.0;
+  std::optional<double> pixel_noise_dof;  // of Student's t; normal where absent
+  double pixel_noise_correlation = 0.0;   // from frame to frame of a track
+  double gross_outlier_probability = 0.0;
+  double gross_outlier_sigma_px = 50.0;
+  double uniform_outlier_probability = 0.0;
   Eigen::Vector3d extrinsic_position_m{0.06, 0.02, -0.01};        // p_B_C
   Eigen::Vector4d extrinsic_rotation_xyzw{-0.5, 0.5, -0.5, 0.5};  // R_B_C: the camera looks along the body's x
 };

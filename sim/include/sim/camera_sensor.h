@@ -1,15 +1,19 @@
 // The tracks of landmarks through the frames of a camera.
+//   trigger_n = n/rate + trigger jitter           the true time of frame n, camera clock
+//   t_cam,n   = trigger_n + stamp jitter          what the frame says
+//   t_imu     = trigger_n + td + row phase * readout,   td that of the stamps (ScenarioConfig::calibration)
+// Both jitters are normal, cut at 4 sigma. Frames are dropped after the tracker has seen them: the tracks run on, and
+// nothing but the frame is missing.
 #pragma once
 
 #include <cstdint>
 #include <map>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "core/measurements.h"
 #include "core/random.h"
 #include "sim/trajectory.h"
+#include "sim/world.h"
 
 namespace plumbline::sim {
 
@@ -18,11 +22,11 @@ struct CameraRecording {
   std::map<std::int64_t, int> track_landmark;
 };
 
-// Frames stamped at multiples of 1/rate whose every row is exposed within [lead_s, duration_s - lead_s]. A frame
-// holds the tracks of the last one that are still visible, then landmarks in their order up to points.per_frame.
-// Visibility is decided on noise-free projections, so that the pixel noise is not truncated. Velocities are filled in
-// where points.velocity_source is `exact`; finite differences are the tracker's (sim/track_velocity.h).
-CameraRecording simulate_camera(const Trajectory& trajectory, const std::vector<Eigen::Vector3d>& landmarks,
-                                const ScenarioConfig& config, double lead_s, core::TrialId id);
+// The frames whose every row is exposed within [lead_s, duration_s - lead_s] but for the jitter. A frame holds the
+// tracks of the last one that are still visible, then landmarks in their order up to points.per_frame. Visibility is
+// decided on noise-free projections, so that the pixel noise is not truncated. Velocities are filled in where
+// points.velocity_source is `exact`; finite differences are the tracker's (sim/track_velocity.h).
+CameraRecording simulate_camera(const Trajectory& trajectory, const World& world, const ScenarioConfig& config,
+                                double lead_s, core::TrialId id);
 
 }  // namespace plumbline::sim

@@ -16,17 +16,22 @@ struct Exposure {
   Eigen::Vector2d pixel;
   double t_imu_s = 0.0;  // when its row was exposed, IMU clock
   double depth_m = 0.0;
+  Eigen::Vector3d camera_W;  // where the camera was then
 };
+
+// The half angle of a cone about the optical axis that holds the picture.
+double half_angle_of_view_rad(const core::PinholeCamera& camera);
 
 // The rig at one frame: what the exact solve of many landmarks shares.
 class FrameView {
  public:
-  // t_cam_s: the frame's stamp, camera clock.
+  // t_cam_s: when the frame was taken, camera clock. half_angle_rad: that of the camera's view.
   FrameView(const Trajectory& trajectory, const core::PinholeCamera& camera, const core::RigCalibration& calibration,
-            double t_cam_s);
+            double half_angle_rad, double t_cam_s);
 
   // Where the landmark is seen, and when: the solution of the equation above to 1e-12 s in time, by Newton's method
-  // with the vertical flow of the middle row. Nothing where the landmark is not in front of the camera at that time.
+  // with the vertical flow of the middle row. Nothing where the camera does not see the landmark (behind it, or beyond
+  // the fold of its lens) at that time or at the middle row's.
   std::optional<Exposure> expose(const Eigen::Vector3d& P_W) const;
 
   // False only for a landmark that is certainly outside the picture or the range of depth: a test by the pose of the
@@ -41,7 +46,7 @@ class FrameView {
 
   const Trajectory& trajectory_;
   const core::PinholeCamera& camera_;
-  const core::RigCalibration& calibration_;
+  core::RigCalibration calibration_;
   double t_middle_s_;
   core::Pose T_C_W_middle_;
   Eigen::Vector3d v_C_;      // of the camera in the world, in camera axes

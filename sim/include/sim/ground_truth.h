@@ -15,7 +15,7 @@ namespace plumbline::sim {
 
 struct GroundTruth {
   core::RigCalibration calibration;            // td of the middle row
-  std::vector<core::StampedState> states;      // at every IMU sample, IMU clock, sorted; biases as drawn
+  std::vector<core::StampedState> states;      // at every IMU sample's stamp, also of those that dropped out; sorted
   std::vector<Eigen::Vector3d> landmarks_W;    // [m]
   std::map<std::int64_t, int> track_landmark;  // the landmark that a track sees
 };
