@@ -73,7 +73,7 @@ TEST(ImageVelocity, ATrackThatSkipsAFrameStartsAnew) {
 TEST(ImageVelocity, ExactIsTheDerivativeAtTheExposure) {
   const ScenarioConfig config = some_config(VelocitySource::kExact);
   const auto trajectory = make_trajectory(config.trajectory, config.duration_s, kId);
-  const auto landmarks = make_world(config.world, *trajectory, config.duration_s, kId);
+  const auto landmarks = make_world(config, *trajectory, kId).points_W;
   const core::RigCalibration calibration = config.calibration();
   const CameraRecording recording = simulate_camera(*trajectory, landmarks, config, 0.25, kId);
   const auto normalised = [&](double t_s, int landmark) -> Eigen::Vector2d {
