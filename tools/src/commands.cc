@@ -88,8 +88,11 @@ int simulate(const SimulateOptions& options) {
       "angular acceleration {:.3f} rad/s^2\n",
       m.path_m, m.speed_rms_m_s, m.acceleration_rms_m_s2, m.rate_rms_rad_s, m.rate_peak_rad_s,
       m.angular_acceleration_rms_rad_s2);
-  if (const auto fit = sim::fit_residuals(scenario.trajectory, scenario.duration_s)) {
-    fmt::print("spline fit residual, rms: {:.3g} m, {:.3g} rad\n", fit->position_rms_m, fit->rotation_rms_rad);
+  if (const auto spline = sim::spline_report(scenario.trajectory, scenario.duration_s)) {
+    fmt::print(
+        "spline of {}, format {}, poses {:.3f} to {:.3f} s after the first; fit residual, rms: {:.3g} m, {:.3g} rad\n",
+        scenario.trajectory.file.generic_string(), core::kPoseFormatNames[static_cast<std::size_t>(spline->format)],
+        spline->from_s, spline->to_s, spline->residuals.position_rms_m, spline->residuals.rotation_rms_rad);
   }
   fmt::print("{} IMU samples, {} frames, {} points, {:.1f} a frame, {} tracks\ndataset: {}\n",
              simulation.measurements.imu.size(), frames, observations,

@@ -10,6 +10,7 @@
 #include "core/hash.h"
 #include "estimator/estimate.h"
 #include "sim/trajectory.h"
+#include "sim/world.h"
 
 namespace plumbline::eval {
 
@@ -153,12 +154,15 @@ void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_
   }
 }
 
-// What only shows when a cell's parts meet: noise the estimator cannot work with, pose files that are too short.
+// What only shows when a cell's parts meet: noise the estimator cannot work with, pose files that are too short, worlds
+// without room for the path.
 void check_cell(const Experiment& e) {
   estimator::require_usable(
       estimator::believed_noise(e.estimator, e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px),
       e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
-  sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, {e.experiment.seed, 0});
+  const core::TrialId id{e.experiment.seed, 0};
+  const auto trajectory = sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, id);
+  sim::make_world(e.scenario, *trajectory, id);
 }
 
 Plan make_plan(ConfigTree root, const std::vector<Axis>& axes, const std::string& default_name) {
