@@ -1,7 +1,9 @@
 #include "estimator/batch_problem.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include <ceres/solver.h>
 
@@ -31,7 +33,9 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values)
   if (!input_.config.estimate.readout) problem_->SetParameterBlockConstant(&readout_s_);
 
   add_priors();
+  inertial_begin_ = problem_->NumResidualBlocks();
   add_inertial_factors();
+  visual_begin_ = problem_->NumResidualBlocks();
   add_points();
 }
 
@@ -185,8 +189,27 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
                      .residuals = ceres_summary.num_residuals_reduced,
                      .parameters = ceres_summary.num_effective_parameters_reduced,
                      .landmarks = static_cast<int>(landmarks_.size()),
-                     .observations = observations_};
+                     .observations = observations_,
+                     .visual = residual_sum(visual_begin_, problem_->NumResidualBlocks()),
+                     .inertial = residual_sum(inertial_begin_, visual_begin_),
+                     .prior = residual_sum(0, inertial_begin_)};
   return outcome;
+}
+
+core::ResidualSum BatchProblem::residual_sum(int first, int last) const {
+  std::vector<ceres::ResidualBlockId> blocks;
+  problem_->GetResidualBlocks(&blocks);
+  ceres::Problem::EvaluateOptions options;
+  options.apply_loss_function = false;
+  options.num_threads = 1;
+  options.residual_blocks = {blocks.begin() + first, blocks.begin() + last};
+  if (options.residual_blocks.empty()) return {};  // Ceres would take them all
+  double cost = 0.0;
+  std::vector<double> residuals;
+  if (!problem_->Evaluate(options, &cost, &residuals, nullptr, nullptr)) {
+    cost = std::numeric_limits<double>::quiet_NaN();
+  }
+  return {.squares = 2.0 * cost, .residuals = static_cast<int>(residuals.size())};
 }
 
 BatchValues BatchProblem::values() const {

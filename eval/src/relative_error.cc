@@ -84,13 +84,6 @@ std::vector<Delta> parse_deltas(std::string_view text) {
   return deltas;
 }
 
-std::vector<Delta> default_deltas() {
-  std::vector<Delta> deltas;
-  for (const double percent : {10.0, 20.0, 30.0, 40.0, 50.0}) deltas.push_back({percent, DeltaUnit::kPercentOfPath});
-  deltas.push_back({1.0, DeltaUnit::kSeconds});
-  return deltas;
-}
-
 RelativeErrors relative_errors(const std::vector<PosePair>& pairs, const Delta& delta, PairStarts starts) {
   const std::vector<double> m = measure(pairs, delta.unit);
   const bool percent = delta.unit == DeltaUnit::kPercentOfPath;

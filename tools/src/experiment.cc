@@ -17,6 +17,8 @@ namespace plumbline::eval {
 void visit(core::ConfigVisitor& v, MetricsConfig& c) {
   v.choice("alignment", c.alignment, kAlignmentNames, "of the trajectory, for the ATE");
   v.value("first_n", c.first_n, core::at_least(0), "poses that decide the alignment; 0: all");
+  v.value("first_s", c.first_s, core::non_negative(), "or those of the first seconds; 0: all");
+  v.value("td_bound_s", c.td_bound_s, core::positive(), "td has converged once its error stays within this for good");
 }
 
 }  // namespace plumbline::eval
@@ -107,8 +109,14 @@ std::vector<Axis> take_axes(ConfigTree& root) {
 Experiment read_experiment(const ConfigTree& root) {
   Experiment experiment;
   core::read_config(root, "", experiment);
-  if (const auto violation = sim::validate(experiment.scenario)) {
-    const std::string key = "scenario." + violation->key;
+  std::optional<core::RuleViolation> violation = sim::validate(experiment.scenario);
+  if (violation) {
+    violation->key = "scenario." + violation->key;
+  } else if (experiment.metrics.first_n != 0 && experiment.metrics.first_s != 0.0) {
+    violation = core::RuleViolation{"eval.first_s", "give eval.first_n or this, not both"};
+  }
+  if (violation) {
+    const std::string& key = violation->key;
     const ConfigTree* value = core::find_value(root, key);
     if (value != nullptr) throw core::config_error(value->origin, key, violation->rule);
     throw core::config_error(root.origin, key, violation->rule);

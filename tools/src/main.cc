@@ -64,13 +64,36 @@ int parse_and_run(int argc, char** argv) {
 
   EvaluateOptions evaluate_options;
   CLI::App* evaluate_command = app.add_subcommand("evaluate", "compare an estimated trajectory with the true one");
-  evaluate_command->add_option("ESTIMATE", evaluate_options.estimate, "TUM file, or folder of an estimate")->required();
-  evaluate_command->add_option("--truth", evaluate_options.truth, "TUM file, or folder of a dataset")->required();
+  evaluate_command
+      ->add_option("ESTIMATE", evaluate_options.estimate, "pose file or folder of an estimate, or a folder of many")
+      ->required();
+  evaluate_command
+      ->add_option("--truth", evaluate_options.truth, "pose file or dataset, or a folder with one for each estimate")
+      ->required();
   evaluate_command->add_option("--align", evaluate_options.alignment, "none, posyaw, se3 or sim3")
       ->transform(CLI::CheckedTransformer(words<plumbline::eval::Alignment>(plumbline::eval::kAlignmentNames)));
-  evaluate_command->add_option("--first", evaluate_options.first_n, "align by the first N poses only")
-      ->check(CLI::NonNegativeNumber);
+  CLI::Option* first = evaluate_command->add_option("--first", evaluate_options.first_n, "align by the first N poses")
+                           ->check(CLI::NonNegativeNumber);
+  evaluate_command->add_option("--first-s", evaluate_options.first_s, "align by the poses of the first T seconds")
+      ->check(CLI::PositiveNumber)
+      ->excludes(first);
+  evaluate_command
+      ->add_option("--rpe", evaluate_options.deltas,
+                   "relative errors over frames (f), seconds, metres or % of the path")
+      ->type_name("10m,1s,20f,10%")
+      ->capture_default_str();
   evaluate_command->add_flag("--json", evaluate_options.json, "print JSON");
+
+  CompareOptions compare_options;
+  CLI::App* compare_command = app.add_subcommand("compare", "is B worse than A? paired by cell, trial and seed");
+  compare_command->add_option("OUT_A", compare_options.a, "folder of the results of A")->required();
+  compare_command->add_option("OUT_B", compare_options.b, "folder of the results of B")->required();
+  compare_command->add_option("--metric", compare_options.metrics, "compare this one only; may be repeated")
+      ->allow_extra_args(false);
+  compare_command->add_option("--alpha", compare_options.alpha, "probability of a false alarm over all tests")
+      ->check(CLI::Range(1e-9, 0.5))
+      ->capture_default_str();
+  compare_command->add_flag("--json", compare_options.json, "print JSON");
 
   ReplayOptions replay_options;
   CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a finished experiment again");
@@ -125,6 +148,7 @@ int parse_and_run(int argc, char** argv) {
   if (*simulate_command) return simulate(simulate_options);
   if (*estimate_command) return estimate(estimate_options);
   if (*evaluate_command) return evaluate(evaluate_options);
+  if (*compare_command) return compare(compare_options);
   if (*replay_command) return replay(replay_options);
   if (*ba_command) return ba(ba_options);
   if (*simulate_ba_command) return simulate_ba(simulate_ba_options);

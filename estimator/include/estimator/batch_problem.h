@@ -59,6 +59,9 @@ class BatchProblem {
   std::optional<core::PosteriorCovariance> posterior_covariance() const;
 
  private:
+  // Of the residual blocks [first, last) in the order in which they were added, without loss functions.
+  core::ResidualSum residual_sum(int first, int last) const;
+
   void add_priors();
   void add_inertial_factors();
   void add_points();
@@ -75,6 +78,8 @@ class BatchProblem {
   std::vector<Eigen::Vector3d> landmarks_;
   std::vector<std::size_t> landmark_tracks_;
   int observations_ = 0;
+  int inertial_begin_ = 0;  // the residual blocks: priors, then inertial, then visual ones
+  int visual_begin_ = 0;
   StateManifold state_manifold_;
   PoseManifold pose_manifold_;
   std::unique_ptr<ceres::Problem> problem_;
