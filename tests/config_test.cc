@@ -14,6 +14,7 @@
 
 #include "core/config_tree.h"
 #include "core/hash.h"
+#include "core/resolved_config.h"
 
 namespace plumbline::core {
 namespace {

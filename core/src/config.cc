@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
 #include "core/hash.h"
+#include "core/resolved_config.h"
 
 namespace plumbline::core {
 

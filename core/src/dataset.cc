@@ -7,6 +7,7 @@
 #include "core/camera_config.h"
 #include "core/csv.h"
 #include "core/error.h"
+#include "core/resolved_config.h"
 
 namespace plumbline::core {
 

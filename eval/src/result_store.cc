@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <initializer_list>
 #include <limits>
 #include <stdexcept>
 #include <system_error>
@@ -22,7 +21,7 @@ namespace {
 using core::DataError;
 using nlohmann::ordered_json;
 
-void require_keys(const ordered_json& object, std::initializer_list<std::string_view> keys, const std::string& where) {
+void require_keys(const ordered_json& object, const std::vector<std::string_view>& keys, const std::string& where) {
   if (!object.is_object()) throw DataError(where + ": must be an object");
   for (const std::string_view key : keys) {
     if (!object.contains(key)) throw DataError(fmt::format("{}: {}: missing", where, key));
@@ -64,26 +63,27 @@ ordered_json to_json(const Metric& metric) {
     json["nees"] = *metric.nees;
     json["nees_dof"] = metric.nees_dof;
   }
+  if (metric.crlb) json["crlb"] = *metric.crlb;
   if (metric.censored) json["censored"] = true;
   return json;
 }
 
 Metric parse_metric(const std::string& name, const ordered_json& json, const std::string& where) {
   const std::string here = fmt::format("{}: metrics.{}", where, name);
-  const bool has_nees = json.is_object() && json.contains("nees");
+  const bool has_nees = json.is_object() && (json.contains("nees") || json.contains("nees_dof"));
+  const bool has_crlb = json.is_object() && json.contains("crlb");
   const bool is_censored = json.is_object() && json.contains("censored");
-  if (has_nees) {
-    require_keys(json, {"value", "nees", "nees_dof"}, here);
-  } else if (is_censored) {
-    require_keys(json, {"value", "censored"}, here);
-  } else {
-    require_keys(json, {"value"}, here);
-  }
+  std::vector<std::string_view> keys = {"value"};
+  if (has_nees) keys.insert(keys.end(), {"nees", "nees_dof"});
+  if (has_crlb) keys.emplace_back("crlb");
+  if (is_censored) keys.emplace_back("censored");
+  require_keys(json, keys, here);
   Metric metric{name, get<double>(json, "value", here)};
   if (has_nees) {
     metric.nees = get<double>(json, "nees", here);
     metric.nees_dof = get<int>(json, "nees_dof", here);
   }
+  if (has_crlb) metric.crlb = get<double>(json, "crlb", here);
   if (is_censored) metric.censored = get<bool>(json, "censored", here);
   return metric;
 }
@@ -91,7 +91,8 @@ Metric parse_metric(const std::string& name, const ordered_json& json, const std
 bool is_finite(const Row& row) {
   return std::isfinite(row.solver.final_cost) && std::isfinite(row.solver.cost_per_dof) &&
          std::all_of(row.metrics.begin(), row.metrics.end(), [](const Metric& metric) {
-           return std::isfinite(metric.value) && std::isfinite(metric.nees.value_or(0.0));
+           return std::isfinite(metric.value) && std::isfinite(metric.nees.value_or(0.0)) &&
+                  std::isfinite(metric.crlb.value_or(0.0));
          });
 }
 

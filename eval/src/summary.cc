@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "eval/bootstrap.h"
+#include "eval/cramer_rao.h"
 #include "eval/metrics.h"
 
 namespace plumbline::eval {
@@ -73,9 +74,35 @@ MetricSummary summarise_values(const std::string& name, const std::vector<double
                         .q95 = quantile(values, 0.95),
                         .mean_ci95 = {},
                         .rmse_ci95 = root_mean_square_interval(values, is_signed),
-                        .nees = {}};
+                        .nees = {},
+                        .bound = {}};
   if (is_signed) summary.mean_ci95 = mean_interval(values, kConfidence);
   return summary;
+}
+
+// Nothing where a trial has no bound of it.
+std::optional<BoundSummary> summarise_bound(const std::vector<const Row*>& rows, std::size_t i,
+                                            const MetricSummary& metric, bool may_claim) {
+  std::vector<double> bounds;
+  for (const Row* row : rows) {
+    if (!row->metrics[i].crlb) return std::nullopt;
+    bounds.push_back(*row->metrics[i].crlb);
+  }
+  BoundSummary summary{.crlb = root_mean_square(bounds), .efficiency = {}, .efficiency_ci95 = {}};
+  if (!may_claim) return summary;
+  summary.efficiency = metric.rmse / summary.crlb;
+  if (metric.rmse_ci95) {
+    summary.efficiency_ci95 = Interval{metric.rmse_ci95->lo / summary.crlb, metric.rmse_ci95->hi / summary.crlb};
+  }
+  return summary;
+}
+
+// The bound neglects the gyroscope's noise within the gaps between states and observations.
+bool gaps_are_short(const std::vector<const Row*>& rows) {
+  return std::all_of(rows.begin(), rows.end(), [](const Row* row) {
+    return std::none_of(row->metrics.begin(), row->metrics.end(),
+                        [](const Metric& m) { return m.name == kKappa2 && m.value > kLargestKappa2; });
+  });
 }
 
 // Nothing where an estimator gives no residuals.
@@ -129,6 +156,7 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
       if (metric.nees) nees.push_back(*metric.nees);
     }
     cell.metrics.push_back(summarise_values(first.name, values));
+    cell.metrics.back().bound = summarise_bound(ok, i, cell.metrics.back(), cell.n_ok == cell.n && gaps_are_short(ok));
     if (nees.empty()) continue;
     if (cell.n_ok == cell.n) {
       cell.metrics.back().nees = summarise_nees(nees, first.nees_dof);
@@ -152,6 +180,11 @@ nlohmann::ordered_json to_json(const CellSummary& cell) {
     json["q95"] = m.q95;
     if (m.mean_ci95) json["mean_ci95"] = pair(*m.mean_ci95);
     if (m.rmse_ci95) json["rmse_ci95"] = pair(*m.rmse_ci95);
+    if (m.bound) {
+      json["crlb"] = m.bound->crlb;
+      if (m.bound->efficiency) json["efficiency"] = *m.bound->efficiency;
+      if (m.bound->efficiency_ci95) json["efficiency_ci95"] = pair(*m.bound->efficiency_ci95);
+    }
     if (m.nees) {
       json["nees_dof"] = m.nees->dof;
       json["nees_mean"] = m.nees->mean;

@@ -58,7 +58,8 @@ void append_title(std::string& out, const CellSummary& cell) {
   fmt::format_to(std::back_inserter(out), "{:<{}}  {}\n", rest, room, count);
 }
 
-void append_metric(std::string& out, const MetricSummary& m) {
+// The last column of figures holds the bound where there is one, else the median.
+void append_metric(std::string& out, const MetricSummary& m, bool bound_column) {
   const MetricInfo info = metric_info(m.name);
   const std::string nees = m.nees ? nees_text(*m.nees) : "";
   if (!info.in_table) {
@@ -70,7 +71,7 @@ void append_metric(std::string& out, const MetricSummary& m) {
   const std::string interval =
       m.rmse_ci95 ? fmt::format("[{}, {}]", shown(m.rmse_ci95->lo), shown(m.rmse_ci95->hi)) : "";
   fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), info.label, shown(m.mean), shown(m.rmse), interval,
-                 shown(m.median), nees);
+                 bound_column ? (m.bound ? shown(m.bound->crlb) : "") : shown(m.median), nees);
 }
 
 }  // namespace
@@ -83,9 +84,11 @@ std::string summary_table(const std::vector<CellSummary>& cells) {
     if (cell.metrics.empty()) {
       out += "  no trial succeeded\n";
     } else {
-      fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), "metric", "mean", "rmse", "[95 % interval]", "median",
-                     "  NEES  (95 % band)");
-      for (const MetricSummary& metric : cell.metrics) append_metric(out, metric);
+      const bool has_bound = std::any_of(cell.metrics.begin(), cell.metrics.end(),
+                                         [](const MetricSummary& m) { return m.bound.has_value(); });
+      fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), "metric", "mean", "rmse", "[95 % interval]",
+                     has_bound ? "bound" : "median", "  NEES  (95 % band)");
+      for (const MetricSummary& metric : cell.metrics) append_metric(out, metric, has_bound);
     }
     if (cell.td_convergence) {
       const ConvergenceSummary& c = *cell.td_convergence;

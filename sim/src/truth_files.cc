@@ -6,6 +6,7 @@
 #include "core/atomic_file.h"
 #include "core/csv.h"
 #include "core/dataset.h"
+#include "core/resolved_config.h"
 
 namespace plumbline::sim {
 namespace {

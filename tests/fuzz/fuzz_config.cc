@@ -6,6 +6,7 @@
 #include "core/config.h"
 #include "core/config_tree.h"
 #include "core/error.h"
+#include "core/resolved_config.h"
 #include "sim/scenario.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {

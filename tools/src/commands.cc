@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/pose_file.h"
+#include "core/resolved_config.h"
 #include "estimator/estimate.h"
 #include "eval/result_store.h"
 #include "eval/series.h"

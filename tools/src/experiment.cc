@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/resolved_config.h"
 #include "estimator/estimate.h"
 #include "sim/trajectory.h"
 #include "sim/world.h"
@@ -18,6 +19,8 @@ void visit(core::ConfigVisitor& v, MetricsConfig& c) {
   v.choice("alignment", c.alignment, kAlignmentNames, "of the trajectory, for the ATE");
   v.value("first_n", c.first_n, core::at_least(0), "poses that decide the alignment; 0: all");
   v.value("first_s", c.first_s, core::non_negative(), "or those of the first seconds; 0: all");
+  v.value("crlb", c.crlb,
+          "the Cramer-Rao bound of each trial beside its errors; with the scenario's noise and all poses");
   v.value("td_bound_s", c.td_bound_s, core::positive(), "td has converged once its error stays within this for good");
 }
 
@@ -168,6 +171,14 @@ void check_cell(const Experiment& e) {
   estimator::require_usable(
       estimator::believed_noise(e.estimator, e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px),
       e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
+  if (e.metrics.crlb) {
+    if (e.metrics.first_n > 0 || e.metrics.first_s > 0.0) {
+      throw core::ConfigError("eval.crlb: is of an alignment by all poses; leave out first_n and first_s");
+    }
+    // The bound speaks of the true noise, whatever the estimator believes.
+    estimator::require_usable({e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px},
+                              e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
+  }
   const core::TrialId id{e.experiment.seed, 0};
   const auto trajectory = sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, id);
   sim::make_world(e.scenario, *trajectory, id);

@@ -3,6 +3,8 @@
 #include <ctime>
 
 #include "estimator/estimate.h"
+#include "estimator/keyframes.h"
+#include "eval/metric_bound.h"
 #include "sim/simulate.h"
 
 namespace plumbline::tools {
@@ -41,6 +43,21 @@ void withhold_nees(const sim::PriorConfig& prior, std::vector<eval::Metric>& met
   }
 }
 
+// The bound of what the estimator was given: the keyframes' observations.
+void add_bound(const Experiment& experiment, const core::MeasurementLog& measurements, const sim::GroundTruth& truth,
+               std::vector<eval::Metric>& metrics) {
+  const estimator::EstimateWhat& free = experiment.estimator.estimate;
+  const eval::CramerRaoBound bound = eval::cramer_rao_bound(
+      measurements, truth,
+      {.frames = estimator::select_keyframes(measurements.frames, experiment.estimator.keyframe_rate_hz),
+       .td = free.td,
+       .readout = free.readout,
+       .extrinsics = free.extrinsics,
+       .alignment = experiment.metrics.alignment});
+  eval::add_bounds(bound, metrics);
+  metrics.push_back({std::string(eval::kKappa2), bound.kappa2});
+}
+
 }  // namespace
 
 eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, TrialTimings* timings) {
@@ -52,6 +69,7 @@ eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, T
   t.estimate_s = clock.lap();
   eval::TrialResult result = eval::evaluate(estimate, truth, experiment.metrics);
   withhold_nees(experiment.scenario.prior, result.metrics);
+  if (experiment.metrics.crlb && result.ok) add_bound(experiment, measurements, truth, result.metrics);
   t.evaluate_s = clock.lap();
   if (timings != nullptr) *timings = t;
   return result;

@@ -25,7 +25,6 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <nlohmann/json_fwd.hpp>
 
 #include "core/config_tree.h"
 
@@ -108,11 +107,6 @@ class ConfigVisitor {
   virtual void end_section() = 0;
 };
 
-enum class PathForm {
-  kPath,
-  kContentHash,  // "xxh3:" and the hash of the file, so that where files lie does not change a configuration's hash
-};
-
 struct KeyDoc {
   std::string key;   // dotted
   std::string type;  // "section" for a struct's own row, which has neither default nor rule
@@ -125,7 +119,6 @@ namespace detail {
 
 using Visit = std::function<void(ConfigVisitor&)>;  // `visit` bound to a struct
 void read(const ConfigTree& tree, std::string dotted_prefix, const Visit& visit_config);
-nlohmann::ordered_json resolve(const Visit& visit_config, PathForm form);
 std::vector<KeyDoc> document(const Visit& visit_config, std::string prefix);
 
 }  // namespace detail
@@ -135,13 +128,6 @@ std::vector<KeyDoc> document(const Visit& visit_config, std::string prefix);
 template <class Config>
 void read_config(const ConfigTree& tree, std::string dotted_prefix, Config& c) {
   detail::read(tree, std::move(dotted_prefix), [&c](ConfigVisitor& v) { visit(v, c); });
-}
-
-// All keys with their values. The dump of the result is input for parse_config and reads back to the bit.
-template <class Config>
-nlohmann::ordered_json resolved_config(const Config& c, PathForm form = PathForm::kPath) {
-  Config copy = c;
-  return detail::resolve([&copy](ConfigVisitor& v) { visit(v, copy); }, form);
 }
 
 // All keys in the order of their visits.

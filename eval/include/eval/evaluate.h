@@ -20,6 +20,7 @@ struct MetricsConfig {
   Alignment alignment = Alignment::kPosyaw;
   int first_n = 0;           // poses that decide the alignment; 0: all
   double first_s = 0.0;      // or those up to so long after the first; 0: all. Not both.
+  bool crlb = false;         // the Cramer-Rao bound of each trial
   double td_bound_s = 1e-3;  // td_convergence_s: what |td error| must stay within
 };
 

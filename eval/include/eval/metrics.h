@@ -9,15 +9,17 @@
 //   extrinsic_position_m  |p_est - p_true| of T_B_C                          3 dof, where estimated
 //   extrinsic_rotation_deg  |Log(R_true^T R_est)| of T_B_C                   3 dof, where estimated
 //   extrinsic             m, as extrinsic_position_m                         6 dof, [position | orientation] jointly
-//   calibration           m, as extrinsic_position_m                         all of T_B_C, td, readout that is
-//   estimated final_pose            m, |p_est - p_true| of the last state, unaligned   6 dof, [position | orientation]
-//   jointly final_position        m, the same                                        3 dof final_orientation_deg
-//   |Log(R_true^T R_est)| of the last state           3 dof final_velocity        m/s, norm of the error of the last
-//   state           3 dof final_bias            rad/s, norm of the last gyroscope bias' error      6 dof, [gyroscope |
-//   accelerometer] jointly final_state           m, as final_pose                                   15 dof joint m, as
-//   final_pose                                   calibration and final_state jointly nis_visual            mean squared
-//   whitened residual at the solution     - nis_inertial          likewise; with noise as stated both are below 1,
-//                         since parameters were fitted to the residuals
+//   calibration           m, as extrinsic_position_m                         all of T_B_C, td, readout that is free
+//   final_pose            m, |p_est - p_true| of the last state, unaligned   6 dof, [position | orientation] jointly
+//   final_position        m, the same                                        3 dof
+//   final_orientation_deg  |Log(R_true^T R_est)| of the last state           3 dof
+//   final_velocity        m/s, norm of the error of the last state           3 dof
+//   final_bias            rad/s, norm of the last gyroscope bias' error      6 dof, [gyroscope | accelerometer] jointly
+//   final_state           m, as final_pose                                   15 dof
+//   joint                 m, as final_pose                                   calibration and final_state jointly
+//   nis_visual            mean squared whitened residual at the solution     -
+//   nis_inertial          likewise; both are below 1 where the noise is as stated, since parameters were fitted to them
+//   kappa2                of the bound, see eval/cramer_rao.h; only with eval.crlb
 //   td_convergence_s      since the first estimated state: the first instant after which |td error| stays within
 //                         eval.td_bound_s for the rest; only where the estimator keeps a history of td
 // A joint block's units do not mix in a norm, so its value is that of the position in it.
@@ -36,8 +38,9 @@ struct Metric {
   std::string name;
   double value = 0.0;
   std::optional<double> nees = std::nullopt;
-  int nees_dof = 0;       // 0 where there is no NEES
-  bool censored = false;  // what is waited for had not happened by the end, which is the value
+  int nees_dof = 0;                           // 0 where there is no NEES
+  std::optional<double> crlb = std::nullopt;  // Cramer-Rao bound of the value (eval/metric_bound.h)
+  bool censored = false;                      // what is waited for had not happened by the end, which is the value
 };
 
 struct MetricInfo {
@@ -48,7 +51,7 @@ struct MetricInfo {
   bool in_table = true;     // false: the value repeats another metric's, only the NEES is new
 };
 
-inline constexpr std::array<MetricInfo, 18> kMetrics = {{
+inline constexpr std::array<MetricInfo, 19> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
@@ -67,9 +70,11 @@ inline constexpr std::array<MetricInfo, 18> kMetrics = {{
     {"joint", "calibration and state", 1e3, false, false},
     {"nis_visual", "visual residuals, squared", 1.0, false, false},
     {"nis_inertial", "inertial residuals, squared", 1.0, false, false},
+    {"kappa2", "noise within the gaps", 1.0, false, false},
 }};
 
 inline constexpr std::string_view kTdConvergence = "td_convergence_s";
+inline constexpr std::string_view kKappa2 = "kappa2";
 
 // A metric that is not listed is shown under its own name and unit.
 constexpr MetricInfo metric_info(std::string_view name) {

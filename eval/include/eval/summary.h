@@ -44,6 +44,14 @@ struct NisSummary {
   Interval band95;
 };
 
+// The Cramer-Rao bound, root of the mean square over the trials, and how near the errors come to it:
+// efficiency = sqrt( sum e^2 / sum b^2 ), with the interval of the RMSE.
+struct BoundSummary {
+  double crlb = 0.0;
+  std::optional<double> efficiency;  // nothing where a trial failed or kappa2 is above kLargestKappa2
+  std::optional<Interval> efficiency_ci95;
+};
+
 struct MetricSummary {
   std::string name;
   double mean = 0.0;
@@ -55,6 +63,7 @@ struct MetricSummary {
   std::optional<Interval> mean_ci95;
   std::optional<Interval> rmse_ci95;
   std::optional<NeesSummary> nees;
+  std::optional<BoundSummary> bound;
 };
 
 struct CellSummary {
@@ -72,9 +81,9 @@ struct CellSummary {
 CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes);
 
 // {"axes", "n", "n_ok", "metrics": {NAME: {"mean", "rmse", "median", "std", "q05", "q95", "mean_ci95", "rmse_ci95",
-//  "nees_dof", "nees_mean", "nees_band95", "within_3_sigma", "within_3_sigma_ci95"}},
-//  "td_convergence": {"n_converged", "share_ci95", "median_s"}, "nis": {"dof", "mean", "band95"}, "note"}; what is not
-//  there is left out.
+//  "crlb", "efficiency", "efficiency_ci95", "nees_dof", "nees_mean", "nees_band95", "within_3_sigma",
+//  "within_3_sigma_ci95"}}, "td_convergence": {"n_converged", "share_ci95", "median_s"}, "nis": {"dof", "mean",
+//  "band95"}, "note"}; what is not there is left out.
 nlohmann::ordered_json to_json(const CellSummary& cell);
 
 }  // namespace plumbline::eval

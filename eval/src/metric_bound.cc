@@ -1,0 +1,55 @@
+#include "eval/metric_bound.h"
+
+#include <array>
+#include <cmath>
+
+namespace plumbline::eval {
+namespace {
+
+struct Block {
+  std::string_view metric;
+  int row;  // in core::PosteriorCovariance
+  int dof;
+  double unit;
+};
+
+constexpr int kState = core::kCovLastState;
+constexpr std::array<Block, 10> kBlocks = {{
+    {"td_error_s", core::kCovTd, 1, 1.0},
+    {"readout_error_s", core::kCovReadout, 1, 1.0},
+    {"extrinsic_position_m", core::kCovExtrinsicPosition, 3, 1.0},
+    {"extrinsic_rotation_deg", core::kCovExtrinsicRotation, 3, core::kDegreesPerRadian},
+    {"extrinsic", core::kCovExtrinsicPosition, 3, 1.0},
+    {"final_pose", kState + core::kPosition, 3, 1.0},
+    {"final_position", kState + core::kPosition, 3, 1.0},
+    {"final_orientation_deg", kState + core::kOrientation, 3, core::kDegreesPerRadian},
+    {"final_velocity", kState + core::kVelocity, 3, 1.0},
+    {"final_bias", kState + core::kGyroBias, 3, 1.0},
+}};
+
+}  // namespace
+
+std::optional<double> metric_bound(const CramerRaoBound& bound, std::string_view metric) {
+  if (metric == "ate_position_m") return bound.ate.position_m;
+  if (metric == "ate_rotation_deg") return bound.ate.rotation_rad * core::kDegreesPerRadian;
+  const core::PosteriorCovariance& P = bound.covariance;
+  if (metric == "td_first_error_s") {
+    const double td = P(core::kCovTd, core::kCovTd);
+    const double readout = P(core::kCovReadout, core::kCovReadout);
+    if (!(td > 0.0 && readout > 0.0)) return std::nullopt;
+    return std::sqrt(td - P(core::kCovTd, core::kCovReadout) + 0.25 * readout);
+  }
+  for (const Block& block : kBlocks) {
+    if (block.metric != metric) continue;
+    const double trace = P.diagonal().segment(block.row, block.dof).sum();
+    if (!(trace > 0.0)) return std::nullopt;
+    return block.unit * std::sqrt(trace);
+  }
+  return std::nullopt;
+}
+
+void add_bounds(const CramerRaoBound& bound, std::vector<Metric>& metrics) {
+  for (Metric& metric : metrics) metric.crlb = metric_bound(bound, metric.name);
+}
+
+}  // namespace plumbline::eval
