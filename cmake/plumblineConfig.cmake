@@ -1,6 +1,6 @@
 # find_package(plumbline): the libraries plumbline::core, sim, factors, estimator, eval and tools.
 include(CMakeFindDependencyMacro)
-foreach(dependency Eigen3 Ceres yaml-cpp fmt nlohmann_json Boost TBB)
+foreach(dependency Eigen3 Ceres yaml-cpp fmt nlohmann_json Boost TBB BZip2)
   find_dependency(${dependency})
 endforeach()
 include(${CMAKE_CURRENT_LIST_DIR}/plumblineTargets.cmake)

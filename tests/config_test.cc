@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "core/config_tree.h"
 #include "core/hash.h"
@@ -419,6 +420,28 @@ TEST(DocumentConfig, ListsEveryKey) {
                        "rig.lens.centre_px|list of 2 numbers|[319.5, 239.5]|each >= 0|principal point",
                    }));
   EXPECT_EQ(document_config(LensConfig{}, "").front().key, "focal_px");
+}
+
+struct WaveConfig {
+  std::vector<double> frequency_hz = {1.0, 2.5};
+};
+void visit(ConfigVisitor& v, WaveConfig& c) { v.value("frequency_hz", c.frequency_hz, positive(), "of its terms"); }
+
+TEST(ListsOfAnyLength, AreReadResolvedAndDocumented) {
+  const auto read_wave = [](std::string_view text) {
+    WaveConfig c;
+    read_config(parse_config(text, "a.yaml"), "", c);
+    return c.frequency_hz;
+  };
+  EXPECT_EQ(read_wave(""), (std::vector<double>{1.0, 2.5}));
+  EXPECT_EQ(read_wave("frequency_hz: []"), std::vector<double>{});
+  EXPECT_EQ(read_wave("frequency_hz: [3, 0.5, 7]"), (std::vector<double>{3.0, 0.5, 7.0}));
+  EXPECT_EQ(message_of([&] { read_wave("frequency_hz: 3"); }),
+            "a.yaml:1: frequency_hz: must be a list of numbers, got 3");
+  EXPECT_EQ(message_of([&] { read_wave("frequency_hz: [1, 0]"); }), "a.yaml:1: frequency_hz[1]: must be > 0, got 0");
+  EXPECT_EQ(resolved_config(WaveConfig{}).dump(), R"({"frequency_hz":[1.0,2.5]})");
+  const KeyDoc doc = document_config(WaveConfig{}, "").front();
+  EXPECT_EQ(doc.type + "|" + doc.default_value + "|" + doc.rule, "list of numbers|[1, 2.5]|each > 0");
 }
 
 TEST(Range, ContainsAndText) {

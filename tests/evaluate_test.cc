@@ -8,6 +8,7 @@
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "core/lie.h"
 #include "core/state.h"
@@ -58,8 +59,15 @@ EstimateLog perfect(const sim::GroundTruth& truth) {
   estimate.readout_estimated = true;
   estimate.extrinsics_estimated = true;
   estimate.covariance = make_covariance();
-  estimate.summary = {
-      .iterations = 9, .final_cost = 50.0, .residuals = 120, .parameters = 20, .landmarks = 7, .observations = 60};
+  estimate.summary = {.iterations = 9,
+                      .final_cost = 50.0,
+                      .residuals = 120,
+                      .parameters = 20,
+                      .landmarks = 7,
+                      .observations = 60,
+                      .visual = {.squares = 60.0, .residuals = 80},
+                      .inertial = {.squares = 27.0, .residuals = 30},
+                      .prior = {}};
   return estimate;
 }
 
@@ -131,7 +139,9 @@ TEST_F(Evaluate, NeesIsOfTheRightBlockAndDimension) {
   const TrialResult result = evaluate();
   for (const Block& b : {Block{"extrinsic_position_m", 0, 3}, Block{"extrinsic_rotation_deg", 3, 3},
                          Block{"extrinsic", 0, 6}, Block{"td_error_s", 6, 1}, Block{"readout_error_s", 7, 1},
-                         Block{"final_pose", 8, 6}, Block{"final_velocity", 14, 3}, Block{"final_bias", 17, 6}}) {
+                         Block{"calibration", 0, 8}, Block{"final_pose", 8, 6}, Block{"final_position", 8, 3},
+                         Block{"final_orientation_deg", 11, 3}, Block{"final_velocity", 14, 3},
+                         Block{"final_bias", 17, 6}, Block{"final_state", 8, 15}, Block{"joint", 0, 23}}) {
     const Eigen::VectorXd e = error_.segment(b.offset, b.dof);
     const Eigen::MatrixXd P = estimate_.covariance.block(b.offset, b.offset, b.dof, b.dof);
     const Metric& m = metric(result, b.name);
@@ -140,6 +150,57 @@ TEST_F(Evaluate, NeesIsOfTheRightBlockAndDimension) {
   }
   EXPECT_FALSE(metric(result, "ate_position_m").nees.has_value());
   EXPECT_FALSE(metric(result, "ate_rotation_deg").nees.has_value());
+}
+
+// td_first = td_middle - readout/2, with the joint covariance: their correlation decides its variance.
+TEST_F(Evaluate, FirstRowTdIsAFunctionOfBoth) {
+  const TrialResult result = evaluate();
+  const Metric& m = metric(result, "td_first_error_s");
+  const double e = error_(core::kCovTd) - 0.5 * error_(core::kCovReadout);
+  const core::PosteriorCovariance& P = estimate_.covariance;
+  const double variance = P(core::kCovTd, core::kCovTd) - P(core::kCovTd, core::kCovReadout) +
+                          0.25 * P(core::kCovReadout, core::kCovReadout);
+  EXPECT_NEAR(m.value, e, 1e-15);
+  EXPECT_NEAR(m.nees.value_or(0.0) / (e * e / variance), 1.0, 1e-10);
+  EXPECT_EQ(m.nees_dof, 1);
+}
+
+TEST_F(Evaluate, JointBlocksHoldWhatIsEstimated) {
+  estimate_.readout_estimated = false;
+  estimate_.extrinsics_estimated = false;
+  const int bias = core::kCovLastState + core::kGyroBias;
+  estimate_.covariance.middleRows<6>(bias).setZero();
+  estimate_.covariance.middleCols<6>(bias).setZero();
+  const TrialResult result = evaluate();
+  ASSERT_TRUE(result.ok) << result.reason;
+  EXPECT_EQ(metric(result, "calibration").nees_dof, 1);
+  EXPECT_NEAR(metric(result, "calibration").nees.value_or(0.0) / metric(result, "td_error_s").nees.value_or(1.0), 1.0,
+              1e-12);
+  EXPECT_EQ(metric(result, "final_state").nees_dof, 9);
+  EXPECT_EQ(metric(result, "joint").nees_dof, 10);
+}
+
+TEST_F(Evaluate, ResidualsByKind) {
+  const TrialResult result = evaluate();
+  EXPECT_DOUBLE_EQ(metric(result, "nis_visual").value, 0.75);
+  EXPECT_DOUBLE_EQ(metric(result, "nis_inertial").value, 0.9);
+}
+
+// The error of td enters the bound of 1 ms, leaves it once more, and enters it for good.
+TEST_F(Evaluate, TdHasConvergedOnceItStaysWithinTheBound) {
+  const double td_s = truth_.calibration.td_s;
+  const core::TimeNs start = estimate_.states.front().t_ns;
+  for (const auto& [t_s, error_s] : {std::pair(0.5, 5e-3), std::pair(1.0, 0.5e-3), std::pair(1.5, -1.1e-3),
+                                     std::pair(2.0, -0.9e-3), std::pair(2.5, 1e-4)}) {
+    estimate_.td_history.push_back({start + core::to_ns(t_s), td_s + error_s, 1e-3});
+  }
+  const Metric converged = metric(evaluate(), "td_convergence_s");
+  EXPECT_DOUBLE_EQ(converged.value, 2.0);
+  EXPECT_FALSE(converged.censored);
+  estimate_.td_history.push_back({start + core::to_ns(3.0), td_s + 2e-3, 1e-3});
+  const Metric never = metric(evaluate(), "td_convergence_s");
+  EXPECT_DOUBLE_EQ(never.value, 3.0);
+  EXPECT_TRUE(never.censored);
 }
 
 TEST_F(Evaluate, OnlyTheAteIsAligned) {
@@ -269,6 +330,30 @@ TEST_F(Evaluate, SeriesHoldsTheTrialOnAGrid) {
   EXPECT_EQ(json.at("estimate").size(), 7U);
   EXPECT_EQ(json.at("truth").at(6).at(10), series.points[10].truth.q.w());
   EXPECT_EQ(json.at("td").at("sigma_s").at(0), 2e-3);
+}
+
+TEST_F(Evaluate, OnlineNeesIsUnalignedAndPerBlock) {
+  core::StateTangent e;
+  e.setLinSpaced(-1e-3, 2e-3);
+  const core::StateCovariance P = estimate_.covariance.bottomRightCorner<15, 15>();
+  for (const std::size_t k : {400U, 800U}) {
+    const auto& [t_ns, x] = truth_.states[k];
+    estimate_.state_history.push_back({t_ns, core::plus(x, e), P});
+  }
+  const TrialResult result = evaluate(Alignment::kSe3);
+  ASSERT_EQ(result.series.nees.size(), 2U);
+  const auto expected = [&](int offset, int dof) {
+    return e.segment(offset, dof).dot(P.block(offset, offset, dof, dof).ldlt().solve(e.segment(offset, dof)));
+  };
+  const NeesPoint& point = result.series.nees[1];
+  EXPECT_DOUBLE_EQ(point.t_s, 4.0);
+  EXPECT_NEAR(point.pose / expected(0, 6), 1.0, 1e-6);
+  EXPECT_NEAR(point.velocity / expected(6, 3), 1.0, 1e-6);
+  EXPECT_NEAR(point.bias / expected(9, 6), 1.0, 1e-6);
+  EXPECT_EQ(to_json(result.series).at("nees").at("pose").size(), 2U);
+  estimate_.state_history[0].covariance.setZero();
+  const std::string stamp = std::to_string(estimate_.state_history[0].t_ns);
+  expect_unusable("the online covariance at " + stamp + " ns is singular or indefinite");
 }
 
 TEST(Series, AGridOfFewStampsTakesEachOnce) {

@@ -142,11 +142,11 @@ TEST(Lie, JacobianIdentities) {
 
 TEST(Lie, SeriesJoinTheClosedForms) {
   const double angle2 = detail::kSmallAngleSquared;
-  const auto series = detail::jacobian_coefficients(angle2 * (1.0 - 1e-12));
+  const RotationCoefficients series = rotation_coefficients(angle2 * (1.0 - 1e-12));
   const long double angle = std::sqrt(static_cast<long double>(angle2));
   // Long double: 1e-19/angle^3 = 3e-15. The series leave out angle^8/10! = 3e-19.
-  EXPECT_NEAR(series.a, static_cast<double>((1.0L - std::cos(angle)) / (angle * angle)), 2e-14);
-  EXPECT_NEAR(series.b, static_cast<double>((angle - std::sin(angle)) / (angle * angle * angle)), 2e-14);
+  EXPECT_NEAR(series.b, static_cast<double>((1.0L - std::cos(angle)) / (angle * angle)), 2e-14);
+  EXPECT_NEAR(series.c, static_cast<double>((angle - std::sin(angle)) / (angle * angle * angle)), 2e-14);
 }
 
 TEST(Lie, PosesComposeAsMatrices) {

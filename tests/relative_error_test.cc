@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/lie.h"
@@ -125,7 +126,7 @@ TEST(RelativeError, DeltasAreReadAsWritten) {
   for (const char* bad : {"", "10", "m", "0m", "-1s", "nans", "1.5f", "101%", "1m,", "1m,,2m", "1 m", "1x"}) {
     EXPECT_THROW(parse_deltas(bad), core::DataError) << bad;
   }
-  EXPECT_EQ(default_deltas().size(), 6U);
+  EXPECT_EQ(parse_deltas(kDefaultDeltas).size(), 6U);
 }
 
 }  // namespace

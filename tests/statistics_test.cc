@@ -11,6 +11,7 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "eval/anees.h"
 #include "eval/nees.h"
 
 namespace plumbline::eval {
@@ -175,6 +176,36 @@ TEST_F(LinearGaussian, WrongCovarianceOrDimensionIsOutside) {
   EXPECT_GT(mean_nees(0.25), band.hi);
   EXPECT_FALSE(chi_square_mean_band(2, kTrials, 0.999).contains(mean_nees(1.0)));
   EXPECT_FALSE(chi_square_mean_band(4, kTrials, 0.999).contains(mean_nees(1.0)));
+}
+
+// A Kalman filter of a scalar random walk, q = 0.1 and r = 1, over 100 trials of 50 instants.
+Anees filter_anees(double covariance_scale) {
+  Gaussian gaussian(5);
+  std::vector<std::vector<double>> nees(100);
+  for (auto& trial : nees) {
+    double P = 1.0;
+    double x = 0.0;
+    double estimate = x + gaussian();
+    for (int k = 0; k < 50; ++k) {
+      x += std::sqrt(0.1) * gaussian();
+      P += 0.1;
+      const double gain = P / (P + 1.0);
+      estimate += gain * (x + gaussian() - estimate);
+      P *= 1.0 - gain;
+      trial.push_back((estimate - x) * (estimate - x) / (covariance_scale * P));
+    }
+  }
+  return average_nees(nees, 1, 0.999);
+}
+
+// The band is that of one instant; of 50 all are inside but with probability 5 %, and the seed is fixed.
+TEST(Anees, SeesAWrongCovarianceAtEveryInstant) {
+  EXPECT_EQ(filter_anees(1.0).share_inside, 1.0);
+  EXPECT_EQ(filter_anees(4.0).share_inside, 0.0);
+  EXPECT_EQ(filter_anees(0.25).share_inside, 0.0);
+  EXPECT_NEAR(mean(filter_anees(1.0).mean), 1.0, 0.1);
+  EXPECT_THROW(average_nees({}, 1, 0.95), std::invalid_argument);
+  EXPECT_THROW(average_nees({{1.0}, {1.0, 2.0}}, 1, 0.95), std::invalid_argument);
 }
 
 }  // namespace

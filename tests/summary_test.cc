@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "eval/bootstrap.h"
 #include "eval/summary_table.h"
 
 namespace plumbline::eval {
@@ -48,6 +49,74 @@ TEST(Summary, FiguresByHand) {
   EXPECT_EQ(nees.dof, 1);
   EXPECT_NEAR(nees.band95.hi, 11.1433 / 4.0, 1e-4);                                          // chi-square of 4
   EXPECT_NEAR(cell.metrics[2].nees.value_or(NeesSummary{}).band95.hi, 39.3641 / 4.0, 1e-4);  // of 24
+}
+
+TEST(Summary, BiasQuantilesAndThreeSigmaCoverage) {
+  const CellSummary cell = summarise(kRows, {});
+  const MetricSummary& td = cell.metrics[1];
+  EXPECT_NEAR(td.q05, -0.85e-5, 1e-18);  // numpy.quantile
+  EXPECT_NEAR(td.q95, 2.85e-5, 1e-18);
+  EXPECT_EQ(td.mean_ci95.value_or(Interval{}).hi,
+            mean_interval({3e-5, -1e-5, 2e-5, 0.0}, 0.95).value_or(Interval{}).hi);
+  EXPECT_FALSE(cell.metrics[0].mean_ci95.has_value());  // no signed error
+  EXPECT_EQ(td.nees.value_or(NeesSummary{}).within_3_sigma, 1.0);
+  EXPECT_NEAR(td.nees.value_or(NeesSummary{}).within_3_sigma_ci95.lo, std::pow(0.025, 0.25), 1e-9);
+
+  std::vector<Row> rows = kRows;
+  rows[0].metrics[1].nees = 8.99;   // |e| just within 3 sigma
+  rows[1].metrics[1].nees = 9.01;   // just beyond
+  rows[2].metrics[2].nees = 20.05;  // chi-square of 6 at 0.9973: 20.0621
+  rows[3].metrics[2].nees = 20.07;
+  const CellSummary beyond = summarise(rows, {});
+  EXPECT_EQ(beyond.metrics[1].nees.value_or(NeesSummary{}).within_3_sigma, 0.75);
+  EXPECT_EQ(beyond.metrics[2].nees.value_or(NeesSummary{}).within_3_sigma, 0.75);
+}
+
+// Trials in which td never settled count as later than all others, never as fast or as absent.
+TEST(Summary, ConvergenceCountsThoseThatNeverDid) {
+  std::vector<Row> rows(5, kRows[0]);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    rows[i].metrics.push_back({std::string(kTdConvergence), 1.0 + static_cast<double>(i)});
+  }
+  rows[0].metrics.back().censored = true;
+  rows[1].metrics.back().censored = true;
+  const ConvergenceSummary three = summarise(rows, {}).td_convergence.value_or(ConvergenceSummary{});
+  EXPECT_EQ(three.n_converged, 3);
+  EXPECT_EQ(three.median_s.value_or(0.0), 5.0);  // 3, 4, 5, never, never
+  EXPECT_NEAR(three.share_ci95.lo, 0.1466, 1e-4);
+  rows[2].metrics.back().censored = true;
+  const CellSummary two = summarise(rows, {});
+  EXPECT_FALSE(two.td_convergence.value_or(ConvergenceSummary{}).median_s.has_value());
+  EXPECT_EQ(to_json(two).at("td_convergence").at("n_converged"), 2);
+  EXPECT_FALSE(to_json(two).at("metrics").contains("td_convergence_s"));
+}
+
+TEST(Summary, ResidualsOfAllTrialsTogether) {
+  std::vector<Row> rows = kRows;
+  for (Row& r : rows)
+    r.solver = {.iterations = 1, .final_cost = 45.0, .cost_per_dof = 0.9, .observations = 1, .landmarks = 1};
+  const NisSummary nis = summarise(rows, {}).nis.value_or(NisSummary{});
+  EXPECT_EQ(nis.dof, 400.0);
+  EXPECT_NEAR(nis.mean, 0.9, 1e-12);
+  EXPECT_NEAR(nis.band95.lo, 0.8662, 1e-3);  // chi-square of 400: 346.48 and 457.31
+  EXPECT_NEAR(nis.band95.hi, 1.1433, 1e-3);
+  rows.push_back(failed());
+  EXPECT_FALSE(summarise(rows, {}).nis.has_value());
+}
+
+TEST(Summary, ManyTrialsHaveABootstrapInterval) {
+  std::vector<Row> rows;
+  std::vector<double> ate;
+  for (int i = 0; i < 200; ++i) {
+    ate.push_back(0.01 * (1.0 + 0.5 * std::sin(i * i)));
+    rows.push_back(row(1e-5 * std::sin(i), 1.0, ate.back()));
+  }
+  const Interval interval = summarise(rows, {}).metrics[0].rmse_ci95.value_or(Interval{});
+  EXPECT_EQ(interval.lo, bca_interval(ate, root_mean_square, 0.95).lo);
+  rows.pop_back();
+  ate.pop_back();
+  EXPECT_EQ(summarise(rows, {}).metrics[0].rmse_ci95.value_or(Interval{}).lo,
+            rms_interval(ate, 0.95).value_or(Interval{}).lo);
 }
 
 TEST(Summary, SignedErrorsHaveExactIntervalsOthersDoNot) {

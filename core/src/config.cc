@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "core/hash.h"
 
@@ -80,6 +81,16 @@ class Reader final : public ConfigVisitor {
     }
     for (std::size_t i = 0; i < x.size(); ++i) {
       x[i] = number(node->items[i], fmt::format("{}[{}]", full(key), i), range, "a number");
+    }
+  }
+
+  void value(std::string_view key, std::vector<double>& x, const Range& range, std::string_view /*doc*/) override {
+    const ConfigTree* node = find(key);
+    if (node == nullptr) return;
+    if (node->kind != Kind::kSequence) throw broken(*node, full(key), "a list of numbers");
+    x.clear();
+    for (const ConfigTree& item : node->items) {
+      x.push_back(number(item, fmt::format("{}[{}]", full(key), x.size()), range, "a number"));
     }
   }
 
@@ -220,6 +231,10 @@ class Resolver final : public ConfigVisitor {
     put(key, std::vector<double>(x.begin(), x.end()));
   }
 
+  void value(std::string_view key, std::vector<double>& x, const Range& /*range*/, std::string_view /*doc*/) override {
+    put(key, x);
+  }
+
   void path(std::string_view key, std::filesystem::path& x, std::string_view /*doc*/) override {
     const bool hashed = form_ == PathForm::kContentHash && !x.empty();
     put(key, hashed ? "xxh3:" + file_hash(x) : x.generic_string());
@@ -283,8 +298,11 @@ class Documenter final : public ConfigVisitor {
   }
 
   void numbers(std::string_view key, std::span<double> x, const Range& range, std::string_view doc) override {
-    const std::string rule = range.text().empty() ? "" : "each " + range.text();
-    add(key, fmt::format("list of {} numbers", x.size()), fmt::format("[{}]", fmt::join(x, ", ")), rule, doc);
+    add(key, fmt::format("list of {} numbers", x.size()), fmt::format("[{}]", fmt::join(x, ", ")), each(range), doc);
+  }
+
+  void value(std::string_view key, std::vector<double>& x, const Range& range, std::string_view doc) override {
+    add(key, "list of numbers", fmt::format("[{}]", fmt::join(x, ", ")), each(range), doc);
   }
 
   void path(std::string_view key, std::filesystem::path& x, std::string_view doc) override {
@@ -304,6 +322,8 @@ class Documenter final : public ConfigVisitor {
   }
 
   void end_section() override { prefixes_.pop_back(); }
+
+  static std::string each(const Range& range) { return range.text().empty() ? "" : "each " + range.text(); }
 
   static std::string or_quotes(const std::string& text) { return text.empty() ? "\"\"" : text; }
 

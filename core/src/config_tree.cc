@@ -251,7 +251,9 @@ ConfigTree load_config_file(const std::filesystem::path& file) {
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) throw ConfigError(label + ": cannot be read");
   text.resize(static_cast<std::size_t>(stream.gcount()));
-  return parse_config(text, label);
+  ConfigTree tree = parse_config(text, label);
+  if (tree.kind == Kind::kNull) throw ConfigError(label + ": holds no keys");
+  return tree;
 }
 
 ConfigOverride parse_override(std::string_view assignment) {

@@ -1,6 +1,7 @@
 #include "core/dataset.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
 #include "core/camera_config.h"
@@ -222,6 +223,7 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
     log.imu.push_back(
         {t_ns, {imu.number(1), imu.number(2), imu.number(3)}, {imu.number(4), imu.number(5), imu.number(6)}});
   }
+  if (log.imu.size() < 2) imu.fail("an IMU needs two samples");
   CsvReader frames(folder / kFramesFile, 1);
   while (frames.next()) {
     const TimeNs t_ns = frames.integer(0);

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "estimator/batch_problem.h"
-#include "estimator/factors/point_factors.h"
+#include "estimator/factors/imu_increment.h"
 #include "estimator/triangulation.h"
 
 namespace plumbline::estimator {
@@ -80,6 +80,10 @@ bool biases_left_linearisation(const BatchInput& input, const BatchValues& from,
   return false;
 }
 
+bool must_retime(const BatchInput& input, double td_s, double timing_td_s) {
+  return !input.config.state_td_s && std::abs(td_s - timing_td_s) > kRetimeS;
+}
+
 bool false_minimum(const BatchInput& input, const core::SolveSummary& summary) {
   return summary.cost_per_dof() > input.config.max_cost_per_dof;
 }
@@ -105,7 +109,7 @@ void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
     if (false_minimum(input, outcome.summary)) {
       std::fill(values.landmarks.begin(), values.landmarks.end(), std::nullopt);
     }
-    if (std::abs(values.calibration.td_s - timing_td_s) > kRetimeS) timing_td_s = values.calibration.td_s;
+    if (must_retime(input, values.calibration.td_s, timing_td_s)) timing_td_s = values.calibration.td_s;
     if (count == input.keyframes.size()) return;
   }
 }
@@ -127,6 +131,10 @@ core::EstimateLog estimate_batch(const core::MeasurementLog& log, const Estimato
                    .tracks = {}};
   input.keyframes = select_keyframes(log.frames, config.keyframe_rate_hz);
   input.tracks = collect_tracks(log.frames, input.keyframes, log.camera);
+  if (config.timing == TimingModel::kFeatureVelocity && drop_without_velocity(input.tracks) > 0 &&
+      input.tracks.empty()) {
+    return failed("no track has the image velocities that estimator.timing = feature_velocity needs");
+  }
   if (input.keyframes.size() < 2) return failed("fewer than two keyframes");
   if (log.imu.size() < 2 || log.imu.front().t_ns > log.prior.t_ns) return failed("no IMU samples at the prior's time");
 
@@ -135,7 +143,7 @@ core::EstimateLog estimate_batch(const core::MeasurementLog& log, const Estimato
   values.states = {log.prior.start};
   values.samples = {nearest_sample(log.imu, 0.0, log.prior.t_ns)};
   values.landmarks.resize(input.tracks.size());
-  double timing_td_s = log.prior.start_calibration.td_s;
+  double timing_td_s = config.state_td_s.value_or(log.prior.start_calibration.td_s);
   grow(input, values, timing_td_s);
 
   // Refine until biases and td stay where the factors were linearised.
@@ -163,7 +171,7 @@ core::EstimateLog estimate_batch(const core::MeasurementLog& log, const Estimato
       std::fill(values.landmarks.begin(), values.landmarks.end(), std::nullopt);
       continue;
     }
-    const bool retime = std::abs(solved.calibration.td_s - timing_td_s) > kRetimeS;
+    const bool retime = must_retime(input, solved.calibration.td_s, timing_td_s);
     if (!bad && (retime || biases_left_linearisation(input, values, solved)) && round + 1 < kMaxRounds) {
       if (retime) timing_td_s = solved.calibration.td_s;
       values = solved;

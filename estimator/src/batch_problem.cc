@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 
 #include <ceres/solver.h>
 
 #include "estimator/factors/imu_factor.h"
-#include "estimator/factors/point_factors.h"
 #include "estimator/factors/prior_factors.h"
 #include "estimator/posterior.h"
 
@@ -32,7 +33,9 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values)
   if (!input_.config.estimate.readout) problem_->SetParameterBlockConstant(&readout_s_);
 
   add_priors();
+  inertial_begin_ = problem_->NumResidualBlocks();
   add_inertial_factors();
+  visual_begin_ = problem_->NumResidualBlocks();
   add_points();
 }
 
@@ -67,53 +70,78 @@ void BatchProblem::add_inertial_factors() {
 }
 
 void BatchProblem::add_points() {
-  // How far observations may move from their states: half the readout, half a sample, and td and readout five sigma
-  // off.
+  // How far observations may move from their states: what lies between them now, half the readout, and td and readout
+  // five sigma off.
   const core::CalibrationSigmas& sigma = input_.log.prior.calibration_sigma;
   const double sample_s = core::to_seconds(input_.log.imu[1].t_ns - input_.log.imu[0].t_ns);
-  const double reach_s = 0.5 * std::abs(start_.calibration.readout_s) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
+  const double margin_s = 0.5 * std::abs(readout_s_) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
   std::vector<FrameTiming> timings;
   for (std::size_t k = 0; k + 1 < states_.size(); ++k) {
     const std::size_t sample = start_.samples[k + 1];
     const core::TimeNs t_cam_ns = input_.log.frames[input_.keyframes[k]].t_cam_ns;
-    timings.push_back({std::make_shared<LocalMotion>(input_.log.imu, sample, reach_s, start_.states[k + 1].bias),
-                       core::to_seconds(t_cam_ns - input_.log.imu[sample].t_ns)});
+    const double offset_s = core::to_seconds(t_cam_ns - input_.log.imu[sample].t_ns);
+    const double reach_s = margin_s + std::abs(offset_s + td_s_);
+    timings.push_back(
+        {std::make_shared<LocalMotion>(input_.log.imu, sample, reach_s, start_.states[k + 1].bias), offset_s});
   }
 
-  const CameraModel model{input_.log.camera, input_.noise.pixel_sigma_px, input_.log.gravity_m_s2};
+  const EstimatorConfig& config = input_.config;
+  const PointModel model{.camera = {.camera = input_.log.camera,
+                                    .pixel_sigma_px = input_.noise.pixel_sigma_px,
+                                    .gravity_m_s2 = input_.log.gravity_m_s2,
+                                    .residual = config.residual},
+                         .timing = config.timing,
+                         .landmark = config.landmark};
   landmarks_.reserve(input_.tracks.size());  // parameter blocks must not move
   for (std::size_t t = 0; t < input_.tracks.size(); ++t) {
-    if (!start_.landmarks[t]) continue;
-    const std::vector<TrackObservation>& observations = input_.tracks[t].observations;
-    Eigen::Vector3d& landmark = landmarks_.emplace_back(*start_.landmarks[t]);
-    const std::size_t anchor = observations.front().keyframe;
-
-    std::vector<std::pair<std::unique_ptr<PropagatedPointFactor>, std::size_t>> factors;
-    bool usable = true;
-    for (auto o = observations.begin() + 1; o != observations.end() && o->keyframe < timings.size(); ++o) {
-      auto factor = std::make_unique<PropagatedPointFactor>(model, timings[anchor], timings[o->keyframe], o->pixel);
-      const std::array<const double*, 6> blocks = {states_[anchor + 1].data(),
-                                                   states_[o->keyframe + 1].data(),
-                                                   extrinsics_.data(),
-                                                   &td_s_,
-                                                   &readout_s_,
-                                                   landmark.data()};
-      Eigen::Vector2d residual;
-      usable = usable && factor->Evaluate(blocks.data(), residual.data(), nullptr);
-      factors.emplace_back(std::move(factor), o->keyframe);
-    }
-    if (!usable || factors.empty()) {
+    const std::optional<Eigen::Vector3d>& start = start_.landmarks[t];
+    if (!start) continue;
+    Eigen::Vector3d& landmark = landmarks_.emplace_back(*start);
+    if (add_point(model, timings, input_.tracks[t], landmark)) {
+      landmark_tracks_.push_back(t);
+    } else {
       landmarks_.pop_back();
-      continue;
     }
-    problem_->AddResidualBlock(new AnchorPointFactor(model, observations.front().pixel), nullptr, landmark.data());
-    for (auto& [factor, keyframe] : factors) {
-      problem_->AddResidualBlock(factor.release(), nullptr, states_[anchor + 1].data(), states_[keyframe + 1].data(),
-                                 extrinsics_.data(), &td_s_, &readout_s_, landmark.data());
-    }
-    landmark_tracks_.push_back(t);
-    observations_ += 1 + static_cast<int>(factors.size());
   }
+}
+
+// False, and nothing added, where a factor cannot be evaluated.
+bool BatchProblem::add_point(const PointModel& model, const std::vector<FrameTiming>& timings, const Track& track,
+                             Eigen::Vector3d& landmark) {
+  const auto view = [&](const TrackObservation& o) -> PointView { return {timings[o.keyframe], o.pixel, o.velocity}; };
+  const TrackObservation& first = track.observations.front();
+  const PointView anchor = view(first);
+  double* const landmark_values = landmark_block(landmark);
+  const auto blocks = [&](std::size_t keyframe) -> std::vector<double*> {
+    return {states_[first.keyframe + 1].data(),
+            states_[keyframe + 1].data(),
+            extrinsics_.data(),
+            &td_s_,
+            &readout_s_,
+            landmark_values};
+  };
+
+  std::vector<std::pair<std::unique_ptr<ceres::CostFunction>, std::size_t>> factors;
+  for (auto o = track.observations.begin() + 1; o != track.observations.end() && o->keyframe < timings.size(); ++o) {
+    auto factor = make_point_factor(model, anchor, view(*o));
+    Eigen::Vector2d residual;
+    if (!factor->Evaluate(blocks(o->keyframe).data(), residual.data(), nullptr)) return false;
+    factors.emplace_back(std::move(factor), o->keyframe);
+  }
+  if (factors.empty()) return false;
+  if (auto term = make_anchor_term(model, anchor, &td_s_, &readout_s_, landmark_values)) {
+    problem_->AddResidualBlock(term->factor.release(), nullptr, term->blocks);
+    ++observations_;
+  }
+  observations_ += static_cast<int>(factors.size());
+  for (auto& [factor, keyframe] : factors) {
+    problem_->AddResidualBlock(factor.release(), nullptr, blocks(keyframe));
+  }
+  return true;
+}
+
+double* BatchProblem::landmark_block(Eigen::Vector3d& landmark) const {
+  return input_.config.landmark == LandmarkType::kFixedBearing ? &landmark.z() : landmark.data();
 }
 
 BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
@@ -128,7 +156,7 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
   ceres_options.dense_linear_algebra_library_type = ceres::LAPACK;
   ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (Eigen::Vector3d& landmark : landmarks_) ordering->AddElementToGroup(landmark.data(), 0);
+  for (Eigen::Vector3d& landmark : landmarks_) ordering->AddElementToGroup(landmark_block(landmark), 0);
   for (StateBlock& state : states_) ordering->AddElementToGroup(state.data(), 1);
   for (double* block : {extrinsics_.data(), &td_s_, &readout_s_}) ordering->AddElementToGroup(block, 1);
   ceres_options.linear_solver_ordering = ordering;
@@ -161,8 +189,27 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
                      .residuals = ceres_summary.num_residuals_reduced,
                      .parameters = ceres_summary.num_effective_parameters_reduced,
                      .landmarks = static_cast<int>(landmarks_.size()),
-                     .observations = observations_};
+                     .observations = observations_,
+                     .visual = residual_sum(visual_begin_, problem_->NumResidualBlocks()),
+                     .inertial = residual_sum(inertial_begin_, visual_begin_),
+                     .prior = residual_sum(0, inertial_begin_)};
   return outcome;
+}
+
+core::ResidualSum BatchProblem::residual_sum(int first, int last) const {
+  std::vector<ceres::ResidualBlockId> blocks;
+  problem_->GetResidualBlocks(&blocks);
+  ceres::Problem::EvaluateOptions options;
+  options.apply_loss_function = false;
+  options.num_threads = 1;
+  options.residual_blocks = {blocks.begin() + first, blocks.begin() + last};
+  if (options.residual_blocks.empty()) return {};  // Ceres would take them all
+  double cost = 0.0;
+  std::vector<double> residuals;
+  if (!problem_->Evaluate(options, &cost, &residuals, nullptr, nullptr)) {
+    cost = std::numeric_limits<double>::quiet_NaN();
+  }
+  return {.squares = 2.0 * cost, .residuals = static_cast<int>(residuals.size())};
 }
 
 BatchValues BatchProblem::values() const {
@@ -187,7 +234,9 @@ std::optional<core::PosteriorCovariance> BatchProblem::posterior_covariance() co
   if (input_.config.estimate.readout) add(&readout_s_, 1, core::kCovReadout);
   add(states_.back().data(), core::kStateDof, core::kCovLastState);
   for (std::size_t i = 0; i + 1 < states_.size(); ++i) blocks.push_back(const_cast<double*>(states_[i].data()));
-  for (const Eigen::Vector3d& landmark : landmarks_) blocks.push_back(const_cast<double*>(landmark.data()));
+  for (const Eigen::Vector3d& landmark : landmarks_) {
+    blocks.push_back(landmark_block(const_cast<Eigen::Vector3d&>(landmark)));
+  }
 
   const auto covariance = leading_covariance(*problem_, blocks, static_cast<int>(wanted.size()));
   if (!covariance) return std::nullopt;

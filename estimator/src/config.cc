@@ -22,14 +22,20 @@ static void visit(core::ConfigVisitor& v, EstimateWhat& c) {
 void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.choice("type", c.type, kEstimatorTypeNames, "`batch`: full maximum a posteriori");
   v.choice("timing", c.timing, kTimingModelNames,
-           "camera timing; `propagated`: the pose at the observation's own time, by the IMU");
-  v.choice("residual", c.residual, kResidualTypeNames, "of a point; `pinhole`: pixels");
-  v.choice("landmark", c.landmark, kLandmarkTypeNames, "`bearing_inverse_depth`: 3 dof, bearing and inverse depth");
+           "camera timing; `propagated`: the pose at the observation's own time, by the IMU; `feature_velocity`: the "
+           "observation moved along its image velocity (VINS-Mono)");
+  v.choice("residual", c.residual, kResidualTypeNames,
+           "of a point; `pinhole`: pixels; `unit_sphere`: on the tangent plane of the observed bearing");
+  v.choice("landmark", c.landmark, kLandmarkTypeNames,
+           "`bearing_inverse_depth`: 3 dof; `fixed_bearing`: inverse depth only, the anchor's observation taken as "
+           "exact, for comparison");
   v.choice("initialisation", c.initialisation, kInitialisationNames, "`prior`: starts from the scenario's prior");
   v.choice("solver", c.solver, kLinearSolverNames,
            "of Ceres, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
   v.value("keyframe_rate_hz", c.keyframe_rate_hz, positive(), "only keyframes' observations enter");
   v.value("pixel_sigma_px", c.pixel_sigma_px, positive(), "scenario", "pixel noise it believes in");
+  v.value("state_td_s", c.state_td_s, core::any(), "estimate",
+          "td by which the states lie at the frames; `estimate`: the prior's, and anew where td has left it by 5 ms");
   v.section("imu", c.imu, "IMU noise it believes in; must be given where the scenario's is 0");
   v.section("estimate", c.estimate, "what is free; the rest is held at the prior's mean");
   v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");

@@ -28,7 +28,7 @@ std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const 
       if (!camera.try_unproject(point.pixel)) continue;
       Track& track = by_id[point.track_id];
       track.id = point.track_id;
-      track.observations.push_back({k, point.pixel});
+      track.observations.push_back({k, point.pixel, point.velocity});
     }
   }
   std::vector<Track> tracks;
@@ -36,6 +36,15 @@ std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const 
     if (track.observations.size() >= 2) tracks.push_back(std::move(track));
   }
   return tracks;
+}
+
+int drop_without_velocity(std::vector<Track>& tracks) {
+  std::size_t dropped = 0;
+  for (Track& track : tracks) {
+    dropped += std::erase_if(track.observations, [](const TrackObservation& o) { return !o.velocity; });
+  }
+  std::erase_if(tracks, [](const Track& track) { return track.observations.size() < 2; });
+  return static_cast<int>(dropped);
 }
 
 }  // namespace plumbline::estimator

@@ -1,9 +1,12 @@
 #include "eval/evaluate.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -57,44 +60,137 @@ bool is_finite(const core::EstimateLog& estimate) {
          std::isfinite(c.readout_s) && estimate.covariance.allFinite();
 }
 
-// NEES of e[offset, offset + dof), where the estimator states a covariance of it.
-std::optional<double> block_nees(std::string_view name, const CovarianceTangent& e, const core::PosteriorCovariance& P,
-                                 int offset, int dof) {
-  const auto value = nees(e.segment(offset, dof), P.block(offset, offset, dof, dof));
-  if (!value) throw Unusable(fmt::format("the covariance of {} is singular or indefinite", name));
-  return value;
+// Indices [first, first + count) of the posterior covariance.
+std::vector<int> indices(int first, int count) {
+  std::vector<int> result(static_cast<std::size_t>(count));
+  std::iota(result.begin(), result.end(), first);
+  return result;
 }
 
-std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const CovarianceTangent& e) {
-  const core::PosteriorCovariance& P = estimate.covariance;
-  const bool is_stated = !P.isZero(0.0);
-  std::vector<Metric> metrics;
-  const auto add = [&](std::string_view name, double value, int offset, int dof, bool claimed) {
-    Metric metric{std::string(name), value};
-    if (is_stated && claimed) {
-      metric.nees = block_nees(name, e, P, offset, dof);
-      metric.nees_dof = dof;
-    }
-    metrics.push_back(std::move(metric));
-  };
-  const auto norm3 = [&](int offset) { return e.segment<3>(offset).norm(); };
-  const auto free = [&](int offset, int dof) { return !P.block(offset, offset, dof, dof).isZero(0.0); };
+std::vector<int> joined(std::vector<int> a, const std::vector<int>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
 
-  add("td_error_s", e(core::kCovTd), core::kCovTd, 1, estimate.td_estimated);
-  add("readout_error_s", e(core::kCovReadout), core::kCovReadout, 1, estimate.readout_estimated);
-  const double extrinsic_m = norm3(core::kCovExtrinsicPosition);
-  const double extrinsic_deg = norm3(core::kCovExtrinsicRotation) * core::kDegreesPerRadian;
-  const bool extrinsics = estimate.extrinsics_estimated;
-  add("extrinsic_position_m", extrinsic_m, core::kCovExtrinsicPosition, 3, extrinsics);
-  add("extrinsic_rotation_deg", extrinsic_deg, core::kCovExtrinsicRotation, 3, extrinsics);
-  add("extrinsic", extrinsic_m, core::kCovExtrinsicPosition, 6, extrinsics);
+// The metrics of an estimate's unaligned error and its stated covariance.
+class BlockMetrics {
+ public:
+  BlockMetrics(const core::EstimateLog& estimate, const CovarianceTangent& e)
+      : e_(e), P_(estimate.covariance), is_stated_(!P_.isZero(0.0)) {}
+
+  // With the NEES of e(block) where the estimator claims a covariance of it.
+  void add(std::string_view name, double value, const std::vector<int>& block, bool claimed) {
+    Metric metric{std::string(name), value};
+    if (is_stated_ && claimed && !block.empty()) {
+      metric.nees = stated_nees(name, e_(block), P_(block, block));
+      metric.nees_dof = static_cast<int>(block.size());
+    }
+    metrics_.push_back(std::move(metric));
+  }
+
+  // td of the first row, td_middle - readout/2, is a function of both: its variance needs their joint covariance.
+  void add_td_first(bool claimed) {
+    const Eigen::RowVector2d J(1.0, -0.5);
+    const Eigen::VectorXd e = J * e_.segment<2>(core::kCovTd);
+    Metric metric{"td_first_error_s", e(0)};
+    if (is_stated_ && claimed) {
+      metric.nees = stated_nees(metric.name, e, J * P_.block<2, 2>(core::kCovTd, core::kCovTd) * J.transpose());
+      metric.nees_dof = 1;
+    }
+    metrics_.push_back(std::move(metric));
+  }
+
+  double norm3(int offset) const { return e_.segment<3>(offset).norm(); }
+  bool is_free(int offset, int dof) const { return !P_.block(offset, offset, dof, dof).isZero(0.0); }
+  std::vector<Metric> take() { return std::move(metrics_); }
+
+ private:
+  static double stated_nees(std::string_view name, const Eigen::VectorXd& e, const Eigen::MatrixXd& P) {
+    const auto value = nees(e, P);
+    if (!value) throw Unusable(fmt::format("the covariance of {} is singular or indefinite", name));
+    return *value;
+  }
+
+  const CovarianceTangent& e_;
+  const core::PosteriorCovariance& P_;
+  bool is_stated_;
+  std::vector<Metric> metrics_;
+};
+
+std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const CovarianceTangent& e) {
+  static_assert(core::kCovReadout == core::kCovTd + 1, "add_td_first takes them together");
   constexpr int kPose = core::kCovLastState + core::kPosition;
+  constexpr int kOrientation = core::kCovLastState + core::kOrientation;
   constexpr int kVelocity = core::kCovLastState + core::kVelocity;
   constexpr int kBias = core::kCovLastState + core::kGyroBias;
-  add("final_pose", norm3(kPose), kPose, 6, free(kPose, 6));
-  add("final_velocity", norm3(kVelocity), kVelocity, 3, free(kVelocity, 3));
-  add("final_bias", norm3(kBias), kBias, 6, free(kBias, 6));
-  return metrics;
+  BlockMetrics m(estimate, e);
+  const bool extrinsics = estimate.extrinsics_estimated;
+  std::vector<int> calibration;
+  if (extrinsics) calibration = indices(core::kCovExtrinsicPosition, 6);
+  if (estimate.td_estimated) calibration.push_back(core::kCovTd);
+  if (estimate.readout_estimated) calibration.push_back(core::kCovReadout);
+  std::vector<int> last;
+  for (const auto& [offset, dof] : {std::pair(kPose, 6), std::pair(kVelocity, 3), std::pair(kBias, 6)}) {
+    if (m.is_free(offset, dof)) last = joined(std::move(last), indices(offset, dof));
+  }
+
+  const double extrinsic_m = m.norm3(core::kCovExtrinsicPosition);
+  const double position_m = m.norm3(kPose);
+  m.add("td_error_s", e(core::kCovTd), {core::kCovTd}, estimate.td_estimated);
+  m.add_td_first(estimate.td_estimated);
+  m.add("readout_error_s", e(core::kCovReadout), {core::kCovReadout}, estimate.readout_estimated);
+  m.add("extrinsic_position_m", extrinsic_m, indices(core::kCovExtrinsicPosition, 3), extrinsics);
+  m.add("extrinsic_rotation_deg", m.norm3(core::kCovExtrinsicRotation) * core::kDegreesPerRadian,
+        indices(core::kCovExtrinsicRotation, 3), extrinsics);
+  m.add("extrinsic", extrinsic_m, indices(core::kCovExtrinsicPosition, 6), extrinsics);
+  m.add("calibration", extrinsic_m, calibration, true);
+  m.add("final_pose", position_m, indices(kPose, 6), m.is_free(kPose, 6));
+  m.add("final_position", position_m, indices(kPose, 3), m.is_free(kPose, 6));
+  m.add("final_orientation_deg", m.norm3(kOrientation) * core::kDegreesPerRadian, indices(kOrientation, 3),
+        m.is_free(kPose, 6));
+  m.add("final_velocity", m.norm3(kVelocity), indices(kVelocity, 3), m.is_free(kVelocity, 3));
+  m.add("final_bias", m.norm3(kBias), indices(kBias, 6), m.is_free(kBias, 6));
+  m.add("final_state", position_m, last, true);
+  m.add("joint", position_m, joined(calibration, last), true);
+  return m.take();
+}
+
+// Nothing where the estimator keeps no history.
+std::optional<Metric> td_convergence(const core::EstimateLog& estimate, double td_s, double bound_s) {
+  const auto& history = estimate.td_history;
+  if (history.empty()) return std::nullopt;
+  const auto outside = [&](const core::TimeOffsetEstimate& h) { return !(std::abs(h.td_s - td_s) <= bound_s); };
+  // One past the last instant at which the error was too large.
+  const auto settled = std::find_if(history.rbegin(), history.rend(), outside).base();
+  const bool never = settled == history.end();
+  const core::TimeNs t_ns = never ? history.back().t_ns : settled->t_ns;
+  Metric metric{std::string(kTdConvergence), core::to_seconds(t_ns - estimate.states.front().t_ns)};
+  metric.censored = never;
+  return metric;
+}
+
+// On the grid of a series.
+std::vector<NeesPoint> online_nees(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
+  std::vector<core::TimeNs> stamps;
+  for (const core::OnlineState& s : estimate.state_history) stamps.push_back(s.t_ns);
+  std::vector<NeesPoint> points;
+  for (const int k : grid_indices(stamps)) {
+    const core::OnlineState& s = estimate.state_history[static_cast<std::size_t>(k)];
+    if (s.t_ns < truth.states.front().t_ns || s.t_ns > truth.states.back().t_ns) {
+      throw Unusable(fmt::format("the online state at {} ns lies outside the recording", s.t_ns));
+    }
+    const core::StateTangent e = core::minus(s.state, sim::state_at(truth, s.t_ns));
+    const auto block = [&](int offset, int dof) {
+      const auto value = nees(e.segment(offset, dof), s.covariance.block(offset, offset, dof, dof));
+      if (!value) throw Unusable(fmt::format("the online covariance at {} ns is singular or indefinite", s.t_ns));
+      return *value;
+    };
+    points.push_back({.t_s = core::to_seconds(s.t_ns - estimate.states.front().t_ns),
+                      .pose = block(core::kPosition, 6),
+                      .velocity = block(core::kVelocity, 3),
+                      .bias = block(core::kGyroBias, 6)});
+  }
+  return points;
 }
 
 void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, const MetricsConfig& config,
@@ -105,7 +201,8 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
   for (std::size_t k = 0; k < states.size(); ++k) {
     pairs.push_back({estimate.states[k].t_ns, estimate.states[k].state.T_W_B, states[k].T_W_B});
   }
-  const TrajectoryErrors ate = trajectory_errors(pairs, {.alignment = config.alignment, .first_n = config.first_n});
+  const TrajectoryErrors ate =
+      trajectory_errors(pairs, {.alignment = config.alignment, .first_n = config.first_n, .first_s = config.first_s});
   if (!ate.ok) throw Unusable(ate.reason);
   if (!is_finite(estimate)) throw Unusable("a velocity, bias, calibration or covariance is not finite");
 
@@ -113,7 +210,15 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
   result.metrics = block_metrics(estimate, e);
   result.metrics.insert(result.metrics.begin(),
                         {{"ate_position_m", ate.position_m.rmse}, {"ate_rotation_deg", ate.rotation_deg.rmse}});
+  for (const auto& [name, sum] :
+       {std::pair("nis_visual", estimate.summary.visual), std::pair("nis_inertial", estimate.summary.inertial)}) {
+    if (sum.residuals > 0) result.metrics.push_back({name, sum.squares / sum.residuals});
+  }
+  if (auto convergence = td_convergence(estimate, truth.calibration.td_s, config.td_bound_s)) {
+    result.metrics.push_back(std::move(*convergence));
+  }
   result.series = make_series(pairs, ate, estimate.td_history, truth.calibration.td_s);
+  result.series.nees = online_nees(estimate, truth);
   for (const Metric& metric : result.metrics) {
     if (!std::isfinite(metric.value)) throw Unusable(metric.name + " overflows");
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/lie.h"
@@ -80,13 +81,6 @@ std::vector<Delta> parse_deltas(std::string_view text) {
     deltas.push_back(parse_delta(text.substr(begin, end - begin)));
     begin = end + 1;
   }
-  return deltas;
-}
-
-std::vector<Delta> default_deltas() {
-  std::vector<Delta> deltas;
-  for (const double percent : {10.0, 20.0, 30.0, 40.0, 50.0}) deltas.push_back({percent, DeltaUnit::kPercentOfPath});
-  deltas.push_back({1.0, DeltaUnit::kSeconds});
   return deltas;
 }
 

@@ -64,14 +64,18 @@ ordered_json to_json(const Metric& metric) {
     json["nees"] = *metric.nees;
     json["nees_dof"] = metric.nees_dof;
   }
+  if (metric.censored) json["censored"] = true;
   return json;
 }
 
 Metric parse_metric(const std::string& name, const ordered_json& json, const std::string& where) {
   const std::string here = fmt::format("{}: metrics.{}", where, name);
   const bool has_nees = json.is_object() && json.contains("nees");
+  const bool is_censored = json.is_object() && json.contains("censored");
   if (has_nees) {
     require_keys(json, {"value", "nees", "nees_dof"}, here);
+  } else if (is_censored) {
+    require_keys(json, {"value", "censored"}, here);
   } else {
     require_keys(json, {"value"}, here);
   }
@@ -80,6 +84,7 @@ Metric parse_metric(const std::string& name, const ordered_json& json, const std
     metric.nees = get<double>(json, "nees", here);
     metric.nees_dof = get<int>(json, "nees_dof", here);
   }
+  if (is_censored) metric.censored = get<bool>(json, "censored", here);
   return metric;
 }
 

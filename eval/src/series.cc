@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include <nlohmann/json.hpp>
+
 namespace plumbline::eval {
 namespace {
 
@@ -83,6 +85,12 @@ ordered_json to_json(const Series& series) {
     json["td"] = {{"t_s", column(series.td, &TimeOffsetPoint::t_s)},
                   {"td_error_s", column(series.td, &TimeOffsetPoint::td_error_s)},
                   {"sigma_s", column(series.td, &TimeOffsetPoint::sigma_s)}};
+  }
+  if (!series.nees.empty()) {
+    json["nees"] = {{"t_s", column(series.nees, &NeesPoint::t_s)},
+                    {"pose", column(series.nees, &NeesPoint::pose)},
+                    {"velocity", column(series.nees, &NeesPoint::velocity)},
+                    {"bias", column(series.nees, &NeesPoint::bias)}};
   }
   return json;
 }

@@ -105,6 +105,22 @@ std::optional<Interval> mean_interval(const std::vector<double>& values, double 
   return Interval{m - *half, m + *half};
 }
 
+std::optional<Interval> quantile_interval(std::vector<double> values, double p, double confidence) {
+  require(p > 0.0 && p < 1.0, "quantile_interval: 0 < p < 1");
+  require_confidence(confidence);
+  const auto n = static_cast<int>(values.size());
+  const boost::math::binomial below(n, p);
+  const double tail = 0.5 * (1.0 - confidence);
+  // x_(l) exceeds the quantile with probability P(below < l), x_(u) falls short of it with P(below >= u).
+  int l = 0;
+  while (l + 1 <= n && boost::math::cdf(below, l) <= tail) ++l;
+  int u = n + 1;
+  while (u > 1 && boost::math::cdf(boost::math::complement(below, u - 2)) <= tail) --u;
+  if (l < 1 || u > n) return std::nullopt;
+  std::sort(values.begin(), values.end());
+  return Interval{values[static_cast<std::size_t>(l - 1)], values[static_cast<std::size_t>(u - 1)]};
+}
+
 Interval binomial_interval(int successes, int n, double confidence) {
   require(n > 0 && successes >= 0 && successes <= n, "binomial_interval: 0 <= successes <= n, n > 0");
   require_confidence(confidence);

@@ -1,16 +1,23 @@
 #include "eval/summary.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
+#include <boost/math/distributions/chi_squared.hpp>
 #include <fmt/format.h>
 
+#include "eval/bootstrap.h"
 #include "eval/metrics.h"
 
 namespace plumbline::eval {
 namespace {
 
 constexpr double kConfidence = 0.95;
+constexpr double kThreeSigma = 0.9973002039367398;  // of a Gaussian within three standard deviations
+constexpr int kAllAgree = 10'000;                   // trials, at which resampling would only take long
 
 void require_same_metrics(const Row& a, const Row& b) {
   const auto differ = [](const Metric& x, const Metric& y) { return x.name != y.name || x.nees_dof != y.nees_dof; };
@@ -20,30 +27,85 @@ void require_same_metrics(const Row& a, const Row& b) {
 }
 
 NeesSummary summarise_nees(const std::vector<double>& nees, int dof) {
-  return {dof, mean(nees), chi_square_mean_band(dof, static_cast<int>(nees.size()), kConfidence)};
+  const auto n = static_cast<int>(nees.size());
+  const double limit = boost::math::quantile(boost::math::chi_squared(dof), kThreeSigma);
+  const auto within = static_cast<int>(std::count_if(nees.begin(), nees.end(), [&](double x) { return x <= limit; }));
+  return {.dof = dof,
+          .mean = mean(nees),
+          .band95 = chi_square_mean_band(dof, n, kConfidence),
+          .within_3_sigma = within / static_cast<double>(n),
+          .within_3_sigma_ci95 = binomial_interval(within, n, kConfidence)};
+}
+
+std::optional<Interval> root_mean_square_interval(const std::vector<double>& values, bool is_signed) {
+  const auto n = static_cast<int>(values.size());
+  if (n < 2) return std::nullopt;
+  if (is_signed) return rmse_interval(root_mean_square(values), n, kConfidence);
+  if (n < kBootstrapTrials || n >= kAllAgree) return rms_interval(values, kConfidence);
+  return bca_interval(values, root_mean_square, kConfidence);
+}
+
+ConvergenceSummary summarise_convergence(const std::vector<const Row*>& rows, std::size_t metric) {
+  ConvergenceSummary summary;
+  std::vector<double> times;
+  for (const Row* row : rows) {
+    const Metric& m = row->metrics[metric];
+    summary.n_converged += m.censored ? 0 : 1;
+    times.push_back(m.censored ? std::numeric_limits<double>::infinity() : m.value);
+  }
+  const auto n = static_cast<int>(times.size());
+  summary.share_ci95 = binomial_interval(summary.n_converged, n, kConfidence);
+  if (summary.n_converged <= n / 2) return summary;  // one of those in the middle is infinite
+  std::sort(times.begin(), times.end());
+  const std::size_t size = times.size();
+  summary.median_s = 0.5 * (times[(size - 1) / 2] + times[size / 2]);
+  return summary;
 }
 
 MetricSummary summarise_values(const std::string& name, const std::vector<double>& values) {
-  const auto n = static_cast<int>(values.size());
-  const double rmse = root_mean_square(values);
+  const bool is_signed = metric_info(name).is_signed;
   MetricSummary summary{.name = name,
                         .mean = mean(values),
-                        .rmse = rmse,
+                        .rmse = root_mean_square(values),
                         .median = median(values),
                         .std = sample_std(values),
-                        .rmse_ci95 = {},
+                        .q05 = quantile(values, 0.05),
+                        .q95 = quantile(values, 0.95),
+                        .mean_ci95 = {},
+                        .rmse_ci95 = root_mean_square_interval(values, is_signed),
                         .nees = {}};
-  if (n >= 2) {
-    summary.rmse_ci95 =
-        metric_info(name).is_signed ? rmse_interval(rmse, n, kConfidence) : rms_interval(values, kConfidence);
+  if (is_signed) summary.mean_ci95 = mean_interval(values, kConfidence);
+  return summary;
+}
+
+// Nothing where an estimator gives no residuals.
+std::optional<NisSummary> summarise_nis(const std::vector<const Row*>& rows) {
+  double squares = 0.0;
+  NisSummary summary;
+  for (const Row* row : rows) {
+    const SolverFigures& solver = row->solver;
+    if (!(solver.cost_per_dof > 0.0)) return std::nullopt;
+    squares += 2.0 * solver.final_cost;
+    summary.dof += std::round(2.0 * solver.final_cost / solver.cost_per_dof);
   }
+  summary.mean = squares / summary.dof;
+  const boost::math::chi_squared distribution(summary.dof);
+  const double tail = 0.5 * (1.0 - kConfidence);
+  summary.band95 = {boost::math::quantile(distribution, tail) / summary.dof,
+                    boost::math::quantile(boost::math::complement(distribution, tail)) / summary.dof};
   return summary;
 }
 
 }  // namespace
 
 CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes) {
-  CellSummary cell{.axes = std::move(axes), .n = static_cast<int>(rows.size()), .n_ok = 0, .metrics = {}, .note = {}};
+  CellSummary cell{.axes = std::move(axes),
+                   .n = static_cast<int>(rows.size()),
+                   .n_ok = 0,
+                   .metrics = {},
+                   .td_convergence = {},
+                   .nis = {},
+                   .note = {}};
   std::vector<const Row*> ok;
   for (const Row& row : rows) {
     if (row.ok) ok.push_back(&row);
@@ -55,6 +117,10 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
   bool withheld = false;
   for (std::size_t i = 0; i < ok.front()->metrics.size(); ++i) {
     const Metric& first = ok.front()->metrics[i];
+    if (first.name == kTdConvergence) {
+      cell.td_convergence = summarise_convergence(ok, i);
+      continue;
+    }
     std::vector<double> values;
     std::vector<double> nees;
     for (const Row* row : ok) {
@@ -70,6 +136,7 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
       withheld = true;
     }
   }
+  if (cell.n_ok == cell.n) cell.nis = summarise_nis(ok);
   if (withheld) cell.note = fmt::format("no NEES is claimed: {} of {} trials failed", cell.n - cell.n_ok, cell.n);
   return cell;
 }
@@ -81,15 +148,26 @@ nlohmann::ordered_json to_json(const CellSummary& cell) {
   for (const MetricSummary& m : cell.metrics) {
     ordered_json json = {{"mean", m.mean}, {"rmse", m.rmse}, {"median", m.median}};
     if (m.std) json["std"] = *m.std;
+    json["q05"] = m.q05;
+    json["q95"] = m.q95;
+    if (m.mean_ci95) json["mean_ci95"] = pair(*m.mean_ci95);
     if (m.rmse_ci95) json["rmse_ci95"] = pair(*m.rmse_ci95);
     if (m.nees) {
       json["nees_dof"] = m.nees->dof;
       json["nees_mean"] = m.nees->mean;
       json["nees_band95"] = pair(m.nees->band95);
+      json["within_3_sigma"] = m.nees->within_3_sigma;
+      json["within_3_sigma_ci95"] = pair(m.nees->within_3_sigma_ci95);
     }
     metrics[m.name] = std::move(json);
   }
   ordered_json json = {{"axes", cell.axes}, {"n", cell.n}, {"n_ok", cell.n_ok}, {"metrics", std::move(metrics)}};
+  if (cell.td_convergence) {
+    json["td_convergence"] = {{"n_converged", cell.td_convergence->n_converged},
+                              {"share_ci95", pair(cell.td_convergence->share_ci95)}};
+    if (cell.td_convergence->median_s) json["td_convergence"]["median_s"] = *cell.td_convergence->median_s;
+  }
+  if (cell.nis) json["nis"] = {{"dof", cell.nis->dof}, {"mean", cell.nis->mean}, {"band95", pair(cell.nis->band95)}};
   if (!cell.note.empty()) json["note"] = cell.note;
   return json;
 }

@@ -87,6 +87,11 @@ std::string summary_table(const std::vector<CellSummary>& cells) {
                      "  NEES  (95 % band)");
       for (const MetricSummary& metric : cell.metrics) append_metric(out, metric);
     }
+    if (cell.td_convergence) {
+      const ConvergenceSummary& c = *cell.td_convergence;
+      fmt::format_to(std::back_inserter(out), "  td converged for good in {}/{} trials{}\n", c.n_converged, cell.n_ok,
+                     c.median_s ? fmt::format(", median after {:.3g} s", *c.median_s) : "");
+    }
     if (!cell.note.empty()) fmt::format_to(std::back_inserter(out), "  {}\n", cell.note);
   }
   // Columns that are empty at the end of a line leave blanks behind.

@@ -26,7 +26,7 @@ Eigen::Quaterniond from_euler(double yaw, double pitch, double roll) {
 }  // namespace
 
 std::array<double, 4> SinusoidSum::derivatives(double t_s) const {
-  std::array<double, 4> d = {offset, 0.0, 0.0, 0.0};
+  std::array<double, 4> d = {offset + slope * t_s, slope, 0.0, 0.0};
   for (const Term& term : terms) {
     const double angle = term.omega_rad_s * t_s + term.phase_rad;
     const double s = term.amplitude * std::sin(angle);
@@ -41,7 +41,7 @@ std::array<double, 4> SinusoidSum::derivatives(double t_s) const {
 }
 
 double SinusoidSum::value(double t_s) const {
-  double x = offset;
+  double x = offset + slope * t_s;
   for (const Term& term : terms) x += term.amplitude * std::sin(term.omega_rad_s * t_s + term.phase_rad);
   return x;
 }
@@ -86,60 +86,21 @@ core::Pose HarmonicTrajectory::pose_at(double t_s) const {
           {shape_.position[0].value(t_s), shape_.position[1].value(t_s), shape_.position[2].value(t_s)}};
 }
 
-HarmonicTrajectory::Shape handheld_shape(const HandheldConfig& config, core::TrialId id) {
-  constexpr int kTerms = 5;
-  const core::RandomStream stream(id.shared(), "trajectory/handheld");
-  // One band a term, equal steps of log frequency, so that no two terms beat slowly against each other; each term has
-  // the same share of the rms rate.
-  const auto channel = [&](std::uint64_t index, double rate_rms) {
-    SinusoidSum sum;
-    const double ratio = config.highest_frequency_hz / config.lowest_frequency_hz;
-    for (int k = 0; k < kTerms; ++k) {
-      const auto u = stream.uniforms(index, static_cast<std::uint64_t>(k));
-      const double omega = kTwoPi * config.lowest_frequency_hz * std::pow(ratio, (k + u[0]) / kTerms);
-      sum.terms.push_back(
-          {.amplitude = rate_rms * std::sqrt(2.0 / kTerms) / omega, .omega_rad_s = omega, .phase_rad = kTwoPi * u[1]});
+HarmonicTrajectory::Shape sinusoids_shape(const SinusoidsConfig& config) {
+  const auto sum = [](const WaveConfig& wave) {
+    SinusoidSum s;
+    s.offset = wave.offset;
+    for (std::size_t i = 0; i < wave.amplitude.size(); ++i) {
+      s.terms.push_back({.amplitude = wave.amplitude[i],
+                         .omega_rad_s = kTwoPi * wave.frequency_hz[i],
+                         .phase_rad = wave.phase_rad.empty() ? 0.0 : wave.phase_rad[i]});
     }
-    return sum;
+    return s;
   };
-  const double per_axis = 1.0 / std::sqrt(3.0);
-  const double speed = config.speed_rms_m_s * per_axis;
-  const double rate = config.rate_rms_rad_s * per_axis;
-  return {.position = {channel(0, speed), channel(1, speed), channel(2, speed)},
-          .yaw = channel(3, rate),
-          .pitch = channel(4, rate),
-          .roll = channel(5, rate)};
-}
-
-namespace {
-
-// What circle and figure-eight share: a slow change of height and a gentle nod, so that no axis stays at rest.
-HarmonicTrajectory::Shape loop_shape(const LoopConfig& config) {
-  const double w = kTwoPi / config.period_s;
-  HarmonicTrajectory::Shape shape;
-  shape.position[2].terms = {{config.height_amplitude_m, 3.0 * w, 0.0}};
-  shape.pitch.terms = {{0.1, 2.0 * w, 0.3}};
-  shape.roll.terms = {{0.1, 3.0 * w, 1.1}};
-  shape.yaw_follows_path = true;
-  return shape;
-}
-
-}  // namespace
-
-HarmonicTrajectory::Shape circle_shape(const LoopConfig& config) {
-  HarmonicTrajectory::Shape shape = loop_shape(config);
-  const double w = kTwoPi / config.period_s;
-  shape.position[0].terms = {{config.radius_m, w, 0.5 * std::numbers::pi}};
-  shape.position[1].terms = {{config.radius_m, w, 0.0}};
-  return shape;
-}
-
-HarmonicTrajectory::Shape figure_eight_shape(const LoopConfig& config) {
-  HarmonicTrajectory::Shape shape = loop_shape(config);
-  const double w = kTwoPi / config.period_s;
-  shape.position[0].terms = {{config.radius_m, w, 0.0}};
-  shape.position[1].terms = {{0.5 * config.radius_m, 2.0 * w, 0.0}};
-  return shape;
+  return {.position = {sum(config.x), sum(config.y), sum(config.z)},
+          .yaw = sum(config.yaw),
+          .pitch = sum(config.pitch),
+          .roll = sum(config.roll)};
 }
 
 }  // namespace plumbline::sim

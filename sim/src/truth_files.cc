@@ -1,6 +1,7 @@
 #include "sim/truth_files.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
 #include "core/csv.h"

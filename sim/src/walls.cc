@@ -10,6 +10,37 @@ bool Wall::solid(const Eigen::Vector2d& ab) const {
   return inside && std::none_of(openings.begin(), openings.end(), [&](const auto& box) { return box.contains(ab); });
 }
 
+Wall upright_wall(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double bottom_z, double top_z) {
+  const Eigen::Vector2d along = to - from;
+  Wall wall;
+  wall.corner_W << from, bottom_z;
+  wall.u_W << along.normalized(), 0.0;
+  wall.v_W = Eigen::Vector3d::UnitZ();
+  wall.size_m = {along.norm(), top_z - bottom_z};
+  return wall;
+}
+
+Wall level_face(const Eigen::Vector2d& corner, const Eigen::Vector2d& u, const Eigen::Vector2d& v, double z) {
+  Wall wall;
+  wall.corner_W << corner, z;
+  wall.u_W << u.normalized(), 0.0;
+  wall.v_W << v.normalized(), 0.0;
+  wall.size_m = {u.norm(), v.norm()};
+  return wall;
+}
+
+Wall turned_round(const Wall& wall) {
+  Wall other = wall;
+  other.corner_W = wall.at({wall.size_m.x(), 0.0});
+  other.u_W = -wall.u_W;
+  for (Eigen::AlignedBox2d& box : other.openings) {
+    const double left = wall.size_m.x() - box.max().x();
+    box.max().x() = wall.size_m.x() - box.min().x();
+    box.min().x() = left;
+  }
+  return other;
+}
+
 bool occludes(const Wall& wall, const Eigen::Vector3d& camera_W, const Eigen::Vector3d& P_W) {
   constexpr double kOnWallM = 1e-6;
   const Eigen::Vector3d n = wall.normal_W();

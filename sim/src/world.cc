@@ -1,11 +1,70 @@
 #include "sim/world.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
+
+#include "core/error.h"
 
 namespace plumbline::sim {
+namespace {
+
+struct Entry {
+  WorldType type;
+  World (*make)(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
+};
+
+constexpr std::array<Entry, kWorldTypeNames.size()> kRegistry = {{{WorldType::kShell, shell_world},
+                                                                  {WorldType::kFrustum, frustum_world},
+                                                                  {WorldType::kPlanes, planes_world},
+                                                                  {WorldType::kRooms, rooms_world},
+                                                                  {WorldType::kCorridor, corridor_world}}};
+
+void refuse_path_through_walls(const Walls& walls, const std::vector<Eigen::Vector3d>& path_W) {
+  for (std::size_t i = 1; i < path_W.size(); ++i) {
+    if (walls.occluded(path_W[i - 1], path_W[i])) {
+      throw core::DataError("scenario.world: the path passes through a wall; walls.clearance_m must be larger");
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> Path::all() const {
+  std::vector<Eigen::Vector3d> points = body_W;
+  points.insert(points.end(), camera_W.begin(), camera_W.end());
+  return points;
+}
+
+Path sample_path(const ScenarioConfig& scenario, const Trajectory& trajectory) {
+  constexpr double kRateHz = 100.0;
+  const core::RigCalibration calibration = scenario.calibration();
+  const int n = static_cast<int>(std::ceil(kRateHz * scenario.duration_s));
+  Path path;
+  for (int i = 0; i <= n; ++i) {
+    const core::Pose T_W_B = trajectory.pose_at(scenario.duration_s * i / n);
+    path.body_W.push_back(T_W_B.p);
+    path.camera_W.push_back(T_W_B * calibration.T_B_C.p);
+  }
+  return path;
+}
 
 World make_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id) {
+  const auto entry =
+      std::find_if(kRegistry.begin(), kRegistry.end(), [&](const Entry& e) { return e.type == scenario.world.type; });
+  if (entry == kRegistry.end()) throw std::logic_error("make_world: unknown type");
+  World world = entry->make(scenario, trajectory, id);
+  if (!world.walls.walls.empty()) {
+    const Path path = sample_path(scenario, trajectory);
+    refuse_path_through_walls(world.walls, path.body_W);
+    refuse_path_through_walls(world.walls, path.camera_W);
+  }
+  return world;
+}
+
+World shell_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id) {
   const WorldConfig& config = scenario.world;
   const core::RandomStream stream(id.shared(), "world/shell");
   World world;
@@ -19,6 +78,23 @@ World make_world(const ScenarioConfig& scenario, const Trajectory& trajectory, c
     const double angle = 2.0 * std::numbers::pi * u[3];
     const double r = std::sqrt(1.0 - z * z);
     world.points_W.emplace_back(centre + distance * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), z));
+  }
+  return world;
+}
+
+World frustum_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id) {
+  const WorldConfig& config = scenario.world;
+  const core::RandomStream stream(id.shared(), "world/frustum");
+  const core::RigCalibration calibration = scenario.calibration();
+  const auto& camera = scenario.camera.model;
+  World world;
+  world.points_W.reserve(static_cast<std::size_t>(config.landmarks));
+  for (int i = 0; i < config.landmarks; ++i) {
+    const auto u = stream.uniforms(static_cast<std::uint64_t>(i));
+    const core::Pose T_W_C = trajectory.pose_at(u[0] * scenario.duration_s) * calibration.T_B_C;
+    const Eigen::Vector3d ray = camera.unproject({u[1] * camera.width_px - 0.5, u[2] * camera.height_px - 0.5});
+    const double depth = config.nearest_m + u[3] * (config.farthest_m - config.nearest_m);
+    world.points_W.emplace_back(T_W_C * Eigen::Vector3d(depth / ray.z() * ray));
   }
   return world;
 }

@@ -1,6 +1,8 @@
 // YAML text as a scenario, or as the value of an override.
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 #include "core/config.h"
 #include "core/config_tree.h"
 #include "core/error.h"

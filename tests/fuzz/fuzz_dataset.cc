@@ -16,13 +16,9 @@ namespace fs = std::filesystem;
 using namespace plumbline;
 
 // The order that tools/fuzz makes its seeds in.
-constexpr std::array<const char*, 7> kFiles = {"meta.yaml",
-                                               "prior.yaml",
-                                               "mav0/imu0/data.csv",
-                                               "mav0/imu0/sensor.yaml",
-                                               "mav0/cam0/data.csv",
-                                               "mav0/cam0/points.csv",
-                                               "mav0/cam0/sensor.yaml"};
+constexpr std::array<const char*, 7> kFiles = {
+    "meta.yaml",          "prior.yaml",           "mav0/imu0/data.csv",   "mav0/imu0/sensor.yaml",
+    "mav0/cam0/data.csv", "mav0/cam0/points.csv", "mav0/cam0/sensor.yaml"};
 
 class Folder {
  public:

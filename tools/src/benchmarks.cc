@@ -2,8 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include "estimator/estimate.h"
-#include "estimator/factors/imu_factor.h"
-#include "estimator/factors/point_factors.h"
+#include "estimator/factors/preintegration.h"
 #include "sim/simulate.h"
 
 namespace plumbline {
@@ -89,57 +88,6 @@ void preintegrate_20_samples(benchmark::State& state) {
   }
 }
 BENCHMARK(preintegrate_20_samples);
-
-// One observation between two keyframes of the simulated recording, with or without Jacobians.
-void propagated_point(benchmark::State& state) {
-  using namespace estimator;
-  const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
-  const core::MeasurementLog& log = s.measurements;
-  const auto timing = [&](std::size_t frame) {
-    const core::TimeNs t = log.frames[frame].t_cam_ns;
-    const auto sample = static_cast<std::size_t>(core::to_seconds(t) * 200.0 + 4.0);
-    return std::pair(sample, FrameTiming{std::make_shared<LocalMotion>(log.imu, sample, 0.1, core::ImuBias{}),
-                                         core::to_seconds(t - log.imu[sample].t_ns)});
-  };
-  const auto [sample_i, timing_i] = timing(0);
-  const auto [sample_j, timing_j] = timing(4);
-  core::PointObservation seen_i;
-  core::PointObservation seen_j;
-  for (const core::PointObservation& a : log.frames[0].points) {
-    for (const core::PointObservation& b : log.frames[4].points) {
-      if (a.track_id == b.track_id) {
-        seen_i = a;
-        seen_j = b;
-      }
-    }
-  }
-  const PropagatedPointFactor factor({log.camera, 1.0, log.gravity_m_s2}, timing_i, timing_j, seen_j.pixel);
-  const StateBlock state_i = pack(s.truth.states[sample_i].state);
-  const StateBlock state_j = pack(s.truth.states[sample_j].state);
-  const PoseBlock extrinsics = pack(s.truth.calibration.T_B_C);
-  const double td = s.truth.calibration.td_s;
-  const double readout = s.truth.calibration.readout_s;
-  Eigen::Vector3d landmark = log.camera.unproject(seen_i.pixel);
-  landmark.z() = 0.2;
-  const std::array<const double*, 6> parameters = {state_i.data(), state_j.data(), extrinsics.data(), &td,
-                                                   &readout,       landmark.data()};
-  std::array<double, 2 * kStateSize> J_i{};
-  std::array<double, 2 * kStateSize> J_j{};
-  std::array<double, 2 * kPoseSize> J_extrinsics{};
-  std::array<double, 2> J_td{};
-  std::array<double, 2> J_readout{};
-  std::array<double, 2 * kLandmarkSize> J_landmark{};
-  std::array<double*, 6> jacobians = {J_i.data(),  J_j.data(),       J_extrinsics.data(),
-                                      J_td.data(), J_readout.data(), J_landmark.data()};
-  Eigen::Vector2d residual;
-  for (auto _ : state) {
-    const bool ok =
-        factor.Evaluate(parameters.data(), residual.data(), state.range(0) != 0 ? jacobians.data() : nullptr);
-    if (!ok) state.SkipWithError("the landmark is not seen");
-    benchmark::DoNotOptimize(residual);
-  }
-}
-BENCHMARK(propagated_point)->Arg(0)->Arg(1)->ArgName("jacobians");
 
 }  // namespace
 }  // namespace plumbline

@@ -13,7 +13,6 @@
 #include "estimator/estimate.h"
 #include "eval/result_store.h"
 #include "eval/series.h"
-#include "eval/trajectory_error.h"
 #include "sim/simulate.h"
 #include "sim/trajectory.h"
 #include "sim/truth_files.h"
@@ -88,8 +87,11 @@ int simulate(const SimulateOptions& options) {
       "angular acceleration {:.3f} rad/s^2\n",
       m.path_m, m.speed_rms_m_s, m.acceleration_rms_m_s2, m.rate_rms_rad_s, m.rate_peak_rad_s,
       m.angular_acceleration_rms_rad_s2);
-  if (const auto fit = sim::fit_residuals(scenario.trajectory, scenario.duration_s)) {
-    fmt::print("spline fit residual, rms: {:.3g} m, {:.3g} rad\n", fit->position_rms_m, fit->rotation_rms_rad);
+  if (const auto spline = sim::spline_report(scenario.trajectory, scenario.duration_s)) {
+    fmt::print(
+        "spline of {}, format {}, poses {:.3f} to {:.3f} s after the first; fit residual, rms: {:.3g} m, {:.3g} rad\n",
+        scenario.trajectory.file.generic_string(), core::kPoseFormatNames[static_cast<std::size_t>(spline->format)],
+        spline->from_s, spline->to_s, spline->residuals.position_rms_m, spline->residuals.rotation_rms_rad);
   }
   fmt::print("{} IMU samples, {} frames, {} points, {:.1f} a frame, {} tracks\ndataset: {}\n",
              simulation.measurements.imu.size(), frames, observations,
@@ -112,36 +114,6 @@ int estimate(const EstimateOptions& options) {
              1e3 * estimate.calibration.readout_s,
              1e3 * std::sqrt(estimate.covariance(core::kCovReadout, core::kCovReadout)), options.out.generic_string());
   return estimate.status == core::SolveStatus::kConverged ? kExitOk : kExitWorse;
-}
-
-int evaluate(const EvaluateOptions& options) {
-  const bool folder = std::filesystem::is_directory(options.estimate);
-  const auto estimate =
-      core::read_tum(folder ? options.estimate / "estimate.tum" : options.estimate, {.allow_unusable = true});
-  std::vector<core::StampedPose> truth;
-  if (std::filesystem::is_directory(options.truth)) {
-    for (const core::StampedState& s : sim::read_truth(options.truth).states) truth.push_back({s.t_ns, s.state.T_W_B});
-  } else {
-    truth = core::read_tum(options.truth);
-  }
-  const eval::TrajectoryErrors errors =
-      eval::trajectory_errors(estimate, truth, {.alignment = options.alignment, .first_n = options.first_n});
-  if (options.json) {
-    fmt::print("{}\n", eval::to_json(errors, options.alignment).dump(2));
-  } else if (!errors.ok) {
-    fmt::print("failed run: {}\n", errors.reason);
-  } else {
-    fmt::print("alignment {}, {} poses matched, coverage {:.1f} %\n\n{:<22}{:>12}{:>12}{:>12}{:>12}{:>12}{:>12}\n",
-               eval::kAlignmentNames[static_cast<std::size_t>(options.alignment)], errors.matched,
-               100.0 * errors.coverage, "", "rmse", "mean", "median", "std", "min", "max");
-    const auto line = [](const char* name, const eval::ErrorStatistics& s) {
-      fmt::print("{:<22}{:>12.6f}{:>12.6f}{:>12.6f}{:>12.6f}{:>12.6f}{:>12.6f}\n", name, s.rmse, s.mean, s.median,
-                 s.std, s.min, s.max);
-    };
-    line("ATE position [m]", errors.position_m);
-    line("ATE rotation [deg]", errors.rotation_deg);
-  }
-  return errors.ok ? kExitOk : kExitWorse;
 }
 
 int replay(const ReplayOptions& options) {

@@ -10,12 +10,15 @@
 #include "core/hash.h"
 #include "estimator/estimate.h"
 #include "sim/trajectory.h"
+#include "sim/world.h"
 
 namespace plumbline::eval {
 
 void visit(core::ConfigVisitor& v, MetricsConfig& c) {
   v.choice("alignment", c.alignment, kAlignmentNames, "of the trajectory, for the ATE");
   v.value("first_n", c.first_n, core::at_least(0), "poses that decide the alignment; 0: all");
+  v.value("first_s", c.first_s, core::non_negative(), "or those of the first seconds; 0: all");
+  v.value("td_bound_s", c.td_bound_s, core::positive(), "td has converged once its error stays within this for good");
 }
 
 }  // namespace plumbline::eval
@@ -106,8 +109,14 @@ std::vector<Axis> take_axes(ConfigTree& root) {
 Experiment read_experiment(const ConfigTree& root) {
   Experiment experiment;
   core::read_config(root, "", experiment);
-  if (const auto violation = sim::validate(experiment.scenario)) {
-    const std::string key = "scenario." + violation->key;
+  std::optional<core::RuleViolation> violation = sim::validate(experiment.scenario);
+  if (violation) {
+    violation->key = "scenario." + violation->key;
+  } else if (experiment.metrics.first_n != 0 && experiment.metrics.first_s != 0.0) {
+    violation = core::RuleViolation{"eval.first_s", "give eval.first_n or this, not both"};
+  }
+  if (violation) {
+    const std::string& key = violation->key;
     const ConfigTree* value = core::find_value(root, key);
     if (value != nullptr) throw core::config_error(value->origin, key, violation->rule);
     throw core::config_error(root.origin, key, violation->rule);
@@ -153,12 +162,15 @@ void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_
   }
 }
 
-// What only shows when a cell's parts meet: noise the estimator cannot work with, pose files that are too short.
+// What only shows when a cell's parts meet: noise the estimator cannot work with, pose files that are too short, worlds
+// without room for the path.
 void check_cell(const Experiment& e) {
   estimator::require_usable(
       estimator::believed_noise(e.estimator, e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px),
       e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
-  sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, {e.experiment.seed, 0});
+  const core::TrialId id{e.experiment.seed, 0};
+  const auto trajectory = sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, id);
+  sim::make_world(e.scenario, *trajectory, id);
 }
 
 Plan make_plan(ConfigTree root, const std::vector<Axis>& axes, const std::string& default_name) {
@@ -167,7 +179,9 @@ Plan make_plan(ConfigTree root, const std::vector<Axis>& axes, const std::string
   std::string& name = plan.base.experiment.name;
   if (name.empty()) name = default_name;
   if (name.find('/') != std::string::npos || name == "." || name == "..") {
-    throw core::ConfigError(fmt::format("experiment.name: must be a plain name, got '{}'", name));
+    const ConfigTree* value = core::find_value(root, "experiment.name");
+    throw core::config_error(value != nullptr ? value->origin : root.origin, "experiment.name",
+                             fmt::format("must be a plain name, got '{}'", name));
   }
   add_cells(root, axes, 0, ordered_json::object(), plan.cells);
   std::string hashes;

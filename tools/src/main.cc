@@ -9,6 +9,7 @@
 #include <glog/logging.h>
 
 #include "core/error.h"
+#include "tools/ba_command.h"
 #include "tools/commands.h"
 #include "tools/version.h"
 
@@ -63,19 +64,74 @@ int parse_and_run(int argc, char** argv) {
 
   EvaluateOptions evaluate_options;
   CLI::App* evaluate_command = app.add_subcommand("evaluate", "compare an estimated trajectory with the true one");
-  evaluate_command->add_option("ESTIMATE", evaluate_options.estimate, "TUM file, or folder of an estimate")->required();
-  evaluate_command->add_option("--truth", evaluate_options.truth, "TUM file, or folder of a dataset")->required();
+  evaluate_command
+      ->add_option("ESTIMATE", evaluate_options.estimate, "pose file or folder of an estimate, or a folder of many")
+      ->required();
+  evaluate_command
+      ->add_option("--truth", evaluate_options.truth, "pose file or dataset, or a folder with one for each estimate")
+      ->required();
   evaluate_command->add_option("--align", evaluate_options.alignment, "none, posyaw, se3 or sim3")
       ->transform(CLI::CheckedTransformer(words<plumbline::eval::Alignment>(plumbline::eval::kAlignmentNames)));
-  evaluate_command->add_option("--first", evaluate_options.first_n, "align by the first N poses only")
-      ->check(CLI::NonNegativeNumber);
+  CLI::Option* first = evaluate_command->add_option("--first", evaluate_options.first_n, "align by the first N poses")
+                           ->check(CLI::NonNegativeNumber);
+  evaluate_command->add_option("--first-s", evaluate_options.first_s, "align by the poses of the first T seconds")
+      ->check(CLI::PositiveNumber)
+      ->excludes(first);
+  evaluate_command
+      ->add_option("--rpe", evaluate_options.deltas,
+                   "relative errors over frames (f), seconds, metres or % of the path")
+      ->type_name("10m,1s,20f,10%")
+      ->capture_default_str();
   evaluate_command->add_flag("--json", evaluate_options.json, "print JSON");
+
+  CompareOptions compare_options;
+  CLI::App* compare_command = app.add_subcommand("compare", "is B worse than A? paired by cell, trial and seed");
+  compare_command->add_option("OUT_A", compare_options.a, "folder of the results of A")->required();
+  compare_command->add_option("OUT_B", compare_options.b, "folder of the results of B")->required();
+  compare_command->add_option("--metric", compare_options.metrics, "compare this one only; may be repeated")
+      ->allow_extra_args(false);
+  compare_command->add_option("--alpha", compare_options.alpha, "probability of a false alarm over all tests")
+      ->check(CLI::Range(1e-9, 0.5))
+      ->capture_default_str();
+  compare_command->add_flag("--json", compare_options.json, "print JSON");
 
   ReplayOptions replay_options;
   CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a finished experiment again");
   replay_command->add_option("OUT_DIR", replay_options.results, "folder of the results")->required();
   replay_command->add_option("RUN_ID", replay_options.run_id, "as in results.jsonl")->required();
   replay_command->add_option("--out", replay_options.out, "write dataset, estimate and series there");
+
+  BaOptions ba_options;
+  CLI::App* ba_command = app.add_subcommand("ba", "adjust a bundle: a problem file of BAL");
+  ba_command->add_option("PROBLEM", ba_options.problem, "BAL file, plain or bzip2")->required();
+  ba_command
+      ->add_option("--solver", ba_options.adjustment.solver, "automatic, dense_schur, sparse_schur, iterative_schur")
+      ->transform(
+          CLI::CheckedTransformer(words<plumbline::estimator::BundleSolver>(plumbline::estimator::kBundleSolverNames)));
+  ba_command
+      ->add_option("--rotation", ba_options.adjustment.rotation, "perturbation: angle_axis (as in the file) or left")
+      ->transform(CLI::CheckedTransformer(
+          words<plumbline::estimator::BundleRotation>(plumbline::estimator::kBundleRotationNames)));
+  ba_command->add_option("--iterations", ba_options.adjustment.max_iterations, "at most so many steps")
+      ->check(CLI::PositiveNumber);
+  ba_command->add_option("--threads", ba_options.adjustment.threads, "threads of the solver")
+      ->check(CLI::PositiveNumber);
+  ba_command->add_option("--truth", ba_options.truth,
+                         "true cameras and points (BAL file), compared after Sim3 alignment");
+  ba_command->add_option("--out", ba_options.out, "write the adjusted problem; compressed where it ends in .bz2");
+  ba_command->add_flag("--json", ba_options.json, "print JSON");
+
+  SimulateBaOptions simulate_ba_options;
+  plumbline::sim::BalWorldConfig& bal_world = simulate_ba_options.world;
+  CLI::App* simulate_ba_command =
+      app.add_subcommand("simulate-ba", "write a bundle problem and its truth as BAL files");
+  simulate_ba_command->add_option("--out", simulate_ba_options.out, "folder for problem.txt and truth.txt")->required();
+  simulate_ba_command->add_option("--seed", simulate_ba_options.seed, "seed of all draws");
+  simulate_ba_command->add_option("--cameras", bal_world.cameras, "cameras on a ring")->check(CLI::Range(3, 100000));
+  simulate_ba_command->add_option("--points", bal_world.points, "points inside the ring")
+      ->check(CLI::Range(10, 100000000));
+  simulate_ba_command->add_option("--pixel-sigma-px", bal_world.pixel_sigma_px, "noise of an observation")
+      ->check(CLI::NonNegativeNumber);
 
   CheckOptions check_options;
   CLI::App* check_command = app.add_subcommand("check", "check configuration files");
@@ -92,7 +148,10 @@ int parse_and_run(int argc, char** argv) {
   if (*simulate_command) return simulate(simulate_options);
   if (*estimate_command) return estimate(estimate_options);
   if (*evaluate_command) return evaluate(evaluate_options);
+  if (*compare_command) return compare(compare_options);
   if (*replay_command) return replay(replay_options);
+  if (*ba_command) return ba(ba_options);
+  if (*simulate_ba_command) return simulate_ba(simulate_ba_options);
   return check(check_options);
 }
 

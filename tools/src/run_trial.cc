@@ -28,11 +28,13 @@ class ThreadClock {
 };
 
 // NEES speaks of a prior whose mean was drawn with the covariance that the estimator is given. Exact means leave no
-// room for it at all, and a fixed mean of td none for td's.
+// room for it at all, and a fixed mean of td none for td's
+// and for what holds td.
 void withhold_nees(const sim::PriorConfig& prior, std::vector<eval::Metric>& metrics) {
   const bool exact = prior.means == sim::PriorMeans::kTruth;
   for (eval::Metric& metric : metrics) {
-    if (exact || (prior.td_mean_s && metric.name == "td_error_s")) {
+    const bool of_td = metric.name.starts_with("td_") || metric.name == "calibration" || metric.name == "joint";
+    if (exact || (prior.td_mean_s && of_td)) {
       metric.nees.reset();
       metric.nees_dof = 0;
     }

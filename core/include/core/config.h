@@ -25,7 +25,7 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "core/config_tree.h"
 
@@ -69,6 +69,9 @@ class ConfigVisitor {
 
   // A list of as many numbers as x has, each in the range.
   virtual void numbers(std::string_view key, std::span<double> x, const Range& range, std::string_view doc) = 0;
+
+  // A list of any length, perhaps none.
+  virtual void value(std::string_view key, std::vector<double>& x, const Range& range, std::string_view doc) = 0;
 
   template <int N>
   void value(std::string_view key, Eigen::Matrix<double, N, 1>& x, const Range& range, std::string_view doc) {

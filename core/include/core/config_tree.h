@@ -47,6 +47,7 @@ struct ConfigEntry {
 // The label names the text in messages; paths in the text are relative to the label's folder.
 ConfigTree parse_config(std::string_view text, std::string label);
 
+// ConfigError for a file that cannot be read or holds nothing.
 ConfigTree load_config_file(const std::filesystem::path& file);
 
 struct ConfigOverride {

@@ -47,6 +47,22 @@ struct TimeOffsetEstimate {
   double sigma_s = 0.0;
 };
 
+// The online history of the state: what the estimator knew at an instant, from the data up to it.
+using StateCovariance = Eigen::Matrix<double, kStateDof, kStateDof>;
+struct OnlineState {
+  TimeNs t_ns = 0;  // IMU clock
+  State state;
+  StateCovariance covariance = StateCovariance::Zero();  // in the order of core/state.h
+};
+
+// Whitened residuals of one kind at the solution. Their sum of squares is smaller than their number even where the
+// noise is as stated, since the parameters were fitted to them; only the sum over all kinds has a known number of
+// degrees of freedom, residuals - parameters.
+struct ResidualSum {
+  double squares = 0.0;
+  int residuals = 0;
+};
+
 struct SolveSummary {
   int iterations = 0;
   double initial_cost = 0.0;  // half the sum of squares
@@ -55,6 +71,9 @@ struct SolveSummary {
   int parameters = 0;
   int landmarks = 0;
   int observations = 0;
+  ResidualSum visual;
+  ResidualSum inertial;
+  ResidualSum prior;
 
   // Mean squared whitened residual per degree of freedom; 1 is expected where the noise is as stated.
   double cost_per_dof() const { return residuals > parameters ? 2.0 * final_cost / (residuals - parameters) : 0.0; }
@@ -70,6 +89,7 @@ struct EstimateLog {
   bool extrinsics_estimated = false;
   PosteriorCovariance covariance = PosteriorCovariance::Zero();
   std::vector<TimeOffsetEstimate> td_history;
+  std::vector<OnlineState> state_history;  // empty where the estimator keeps none
   SolveSummary summary;
 };
 

@@ -76,26 +76,25 @@ Vector3<T> log_so3(const Eigen::Quaternion<T>& q) {
   return v * (T(2) * atan2(n, w) / n);
 }
 
-namespace detail {
-// (1 - cos angle) / angle^2 and (angle - sin angle) / angle^3
-struct JacobianCoefficients {
-  double a;
+// b = (1 - cos angle) / angle^2 and c = (angle - sin angle) / angle^3, which make up Exp and its Jacobians:
+//   cos angle = 1 - b angle^2        sin angle / angle = 1 - c angle^2
+struct RotationCoefficients {
   double b;
+  double c;
 };
-inline JacobianCoefficients jacobian_coefficients(double angle2) {
-  if (angle2 < kSmallAngleSquared) {
+inline RotationCoefficients rotation_coefficients(double angle2) {
+  if (angle2 < detail::kSmallAngleSquared) {
     return {0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0 * (1.0 - angle2 / 56.0)),
             1.0 / 6.0 - angle2 / 120.0 * (1.0 - angle2 / 42.0 * (1.0 - angle2 / 72.0))};
   }
   const double angle = std::sqrt(angle2);
   return {(1.0 - std::cos(angle)) / angle2, (angle - std::sin(angle)) / (angle2 * angle)};
 }
-}  // namespace detail
 
 // Right Jacobian: Exp(theta + d) = Exp(theta) Exp(Jr(theta) d) to first order (Sola eq. 143).
 inline Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& theta) {
   const double angle2 = theta.squaredNorm();
-  const auto [a, b] = detail::jacobian_coefficients(angle2);
+  const auto [a, b] = rotation_coefficients(angle2);
   Eigen::Matrix3d J = b * theta * theta.transpose() - a * skew(theta);
   J.diagonal().array() += 1.0 - b * angle2;
   return J;
@@ -103,7 +102,7 @@ inline Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& theta) {
 
 // Jr(theta) x
 inline Eigen::Vector3d right_jacobian_times(const Eigen::Vector3d& theta, const Eigen::Vector3d& x) {
-  const auto [a, b] = detail::jacobian_coefficients(theta.squaredNorm());
+  const auto [a, b] = rotation_coefficients(theta.squaredNorm());
   const Eigen::Vector3d c = theta.cross(x);
   return x - a * c + b * theta.cross(c);
 }

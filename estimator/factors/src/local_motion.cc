@@ -25,53 +25,67 @@ LocalMotion::LocalMotion(std::span<const core::ImuSample> samples, std::size_t s
     advance(samples[i], samples[i + 1], bias, tau(i + 1) - tau(i), increment);
     nodes_.push_back({tau(i + 1), samples[i + 1], increment});
   }
+  const double span_s = nodes_.back().tau_s - nodes_.front().tau_s;
+  if (span_s > 0.0) nodes_per_s_ = static_cast<double>(nodes_.size() - 1) / span_s;
 }
 
-bool LocalMotion::at(double tau_s, const core::ImuBias& bias, LocalPose& pose, LocalPoseJacobians* jacobians) const {
+bool LocalMotion::find_step(double tau_s, const core::ImuBias& bias, LocalStep& step) const {
   if (nodes_.size() < 2 || !(tau_s >= nodes_.front().tau_s && tau_s <= nodes_.back().tau_s)) return false;
   // The last node at or before tau, but for the very end, which belongs to the last step. Samples are about equally
   // spaced, so the guess is right or next to right.
-  const double span_s = nodes_.back().tau_s - nodes_.front().tau_s;
-  const double steps = static_cast<double>(nodes_.size() - 1);
-  auto n = static_cast<std::size_t>((tau_s - nodes_.front().tau_s) / span_s * steps);
+  auto n = static_cast<std::size_t>((tau_s - nodes_.front().tau_s) * nodes_per_s_);
   n = std::min(n, nodes_.size() - 2);
   while (n > 0 && tau_s < nodes_[n].tau_s) --n;
   while (n + 2 < nodes_.size() && tau_s >= nodes_[n + 1].tau_s) ++n;
   const Node& node = nodes_[n];
   const Node& after = nodes_[n + 1];
   const ImuIncrement& x = node.increment;
-  const double dt = after.tau_s - node.tau_s;
-  const double u = tau_s - node.tau_s;
 
   // The node at the bias that is asked for.
   const Eigen::Vector3d d_bg = bias.gyro_rad_s - bias_.gyro_rad_s;
   const Eigen::Vector3d d_ba = bias.accel_m_s2 - bias_.accel_m_s2;
   const Eigen::Vector3d correction = x.R_bg * d_bg;
-  const Eigen::Matrix3d R0 = x.R * core::exp_so3(correction);
-  const Eigen::Vector3d v0 = x.v + x.v_bg * d_bg + x.v_ba * d_ba;
-  const Eigen::Vector3d p0 = x.p + x.p_bg * d_bg + x.p_ba * d_ba;
+  step.x_ = &x;
+  step.tau0_s_ = node.tau_s;
+  step.tau1_s_ = after.tau_s;
+  step.Jr_correction_ = core::right_jacobian(correction);
+  step.R0_.noalias() = x.R * core::exp_so3(correction);
+  step.v0_ = x.v + x.v_bg * d_bg + x.v_ba * d_ba;
+  step.p0_ = x.p + x.p_bg * d_bg + x.p_ba * d_ba;
+  step.w0_ = node.sample.gyro_rad_s - bias.gyro_rad_s;
+  step.f0_ = node.sample.accel_m_s2 - bias.accel_m_s2;
+  const double per_s = 1.0 / (after.tau_s - node.tau_s);
+  step.gyro_slope_ = per_s * (after.sample.gyro_rad_s - node.sample.gyro_rad_s);
+  step.accel_slope_ = per_s * (after.sample.accel_m_s2 - node.sample.accel_m_s2);
+  return true;
+}
 
-  // The step from the node to tau, the samples linear in between.
-  const Eigen::Vector3d gyro_slope = (after.sample.gyro_rad_s - node.sample.gyro_rad_s) / dt;
-  const Eigen::Vector3d accel_slope = (after.sample.accel_m_s2 - node.sample.accel_m_s2) / dt;
-  const Eigen::Vector3d w0 = node.sample.gyro_rad_s - bias.gyro_rad_s;
-  const Eigen::Vector3d f0 = node.sample.accel_m_s2 - bias.accel_m_s2;
-  const Eigen::Vector3d f1 = f0 + u * accel_slope;
-  const Eigen::Vector3d phi = u * w0 + 0.5 * u * u * gyro_slope;
-  const Eigen::Matrix3d dR = core::exp_so3(phi);
-  pose.R = R0 * dR;
-  pose.omega = core::right_jacobian_times(phi, w0 + u * gyro_slope);
-  const Eigen::Vector3d a = 0.5 * (R0 * f0 + pose.R * f1);
-  const Eigen::Vector3d a_dot = 0.5 * (pose.R * (pose.omega.cross(f1) + accel_slope));
-  pose.p = p0 + u * v0 + 0.5 * u * u * a;
-  pose.p_dot = v0 + u * a + 0.5 * u * u * a_dot;
-  if (jacobians == nullptr) return true;
+LocalPose LocalStep::at(double tau_s) const {
+  const double u = tau_s - tau0_s_;
+  const double half_u2 = 0.5 * u * u;
+  const Eigen::Vector3d f1 = f0_ + u * accel_slope_;
+  const Eigen::Vector3d phi = angle_within(u);
+  LocalPose pose;
+  pose.R.noalias() = R0_ * core::exp_so3(phi);
+  pose.omega = core::right_jacobian_times(phi, w0_ + u * gyro_slope_);
+  const Eigen::Vector3d a = 0.5 * (R0_ * f0_ + pose.R * f1);
+  const Eigen::Vector3d a_dot = 0.5 * (pose.R * (pose.omega.cross(f1) + accel_slope_));
+  pose.p = p0_ + u * v0_ + half_u2 * a;
+  pose.p_dot = v0_ + u * a + half_u2 * a_dot;
+  return pose;
+}
 
-  const Eigen::Matrix3d R0_bg = core::right_jacobian(correction) * x.R_bg;
-  jacobians->R_bg = dR.transpose() * R0_bg - u * core::right_jacobian(phi);
-  const Eigen::Matrix3d a_bg = -0.5 * (R0 * core::skew(f0) * R0_bg + pose.R * core::skew(f1) * jacobians->R_bg);
-  jacobians->p_bg = x.p_bg + u * x.v_bg + 0.5 * u * u * a_bg;
-  jacobians->p_ba = x.p_ba + u * x.v_ba - 0.25 * u * u * (R0 + pose.R);
+LocalPoseJacobians LocalStep::jacobians(double tau_s, const LocalPose& pose) const {
+  const auto p = pull_back<3>(tau_s, pose, Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Zero());
+  const auto R = pull_back<3>(tau_s, pose, Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Identity());
+  return {.R_bg = R.b_g, .p_bg = p.b_g, .p_ba = p.b_a};
+}
+
+bool LocalMotion::at(double tau_s, const core::ImuBias& bias, LocalPose& pose, LocalPoseJacobians* jacobians) const {
+  LocalStep step;
+  if (!find_step(tau_s, bias, step)) return false;
+  pose = step.at(tau_s);
+  if (jacobians != nullptr) *jacobians = step.jacobians(tau_s, pose);
   return true;
 }
 

@@ -9,40 +9,89 @@
 namespace plumbline::estimator {
 namespace {
 
-using core::kAccelBias;
-using core::kGyroBias;
-using core::kOrientation;
-using core::kPosition;
-using core::kVelocity;
+using Eigen::Matrix3d;
 
-// F X for the error (truth minus measured) of one step, block rows in the order of core/state.h:
-//   theta' = Exp(-phi) theta - Jr dt b_g
-//   a      = -R0 [f0]x/2 theta - R1 [f1]x/2 theta' - (R0 + R1)/2 b_a
-//   v' = v + a dt,  p' = p + v dt + a dt^2/2
-void apply_transition(const ImuStep& step, StateMatrix& X) {
-  using Rows = Eigen::Matrix<double, 3, core::kStateDof>;
-  const Rows theta = step.dR_T * X.middleRows<3>(kOrientation) - step.Jr_dt * X.middleRows<3>(kGyroBias);
-  const Rows a =
-      -step.half0 * X.middleRows<3>(kOrientation) - step.half1 * theta - step.mean_R * X.middleRows<3>(kAccelBias);
-  X.middleRows<3>(kPosition) += step.dt * X.middleRows<3>(kVelocity) + 0.5 * step.dt * step.dt * a;
-  X.middleRows<3>(kVelocity) += step.dt * a;
-  X.middleRows<3>(kOrientation) = theta;
-}
+// The covariance by 3 x 3 blocks, of the error (truth minus measured); the biases walk independently, so that theirs
+// are multiples of I.
+class Covariance {
+ public:
+  // One step with white noise of these variances an axis, and walks of the biases by these.
+  void advance(const ImuStep& step, double gyro2, double accel2, double gyro_walk2, double accel_walk2) {
+    const auto& [dt, dR_T, Jr, H, G, M] = step;
+    const double h = 0.5 * dt * dt;
+    const double g2 = gyro_bias_ + gyro2;  // the noise of the samples is one more bias, for this step only
+    const double a2 = accel_bias_ + accel2;
 
-// v' and p' get dt a and dt^2/2 a, where a has the covariance a_cov and the orientation's noise theta_a_cov with it.
-void add_noise_of_acceleration(double dt, const Eigen::Matrix3d& a_cov, const Eigen::Matrix3d& theta_a_cov,
-                               StateMatrix& P) {
-  const double to_v = dt;
-  const double to_p = 0.5 * dt * dt;
-  P.block<3, 3>(kVelocity, kVelocity) += to_v * to_v * a_cov;
-  P.block<3, 3>(kPosition, kPosition) += to_p * to_p * a_cov;
-  P.block<3, 3>(kPosition, kVelocity) += to_p * to_v * a_cov;
-  P.block<3, 3>(kVelocity, kPosition) += to_p * to_v * a_cov;
-  P.block<3, 3>(kOrientation, kVelocity) += to_v * theta_a_cov;
-  P.block<3, 3>(kVelocity, kOrientation) += to_v * theta_a_cov.transpose();
-  P.block<3, 3>(kOrientation, kPosition) += to_p * theta_a_cov;
-  P.block<3, 3>(kPosition, kOrientation) += to_p * theta_a_cov.transpose();
-}
+    // Covariances of a and of theta' with all that there was before the step.
+    const Matrix3d a_p = -H * p_theta_.transpose() + G * p_bg_.transpose() - M * p_ba_.transpose();
+    const Matrix3d a_v = -H * v_theta_.transpose() + G * v_bg_.transpose() - M * v_ba_.transpose();
+    const Matrix3d a_theta = -H * theta_ + G * theta_bg_.transpose();
+    const Matrix3d H_theta_bg = H * theta_bg_;
+    const Matrix3d theta_p = dR_T * p_theta_.transpose() - Jr * p_bg_.transpose();
+    const Matrix3d theta_v = dR_T * v_theta_.transpose() - Jr * v_bg_.transpose();
+    const Matrix3d theta_theta = dR_T * theta_ - Jr * theta_bg_.transpose();
+    const Matrix3d dR_theta_bg = dR_T * theta_bg_;
+
+    // And with each other.
+    const Matrix3d a_a = -a_theta * H.transpose() + (g2 * G - H_theta_bg) * G.transpose() + (a2 * M) * M.transpose();
+    const Matrix3d theta_a = -theta_theta * H.transpose() + (dR_theta_bg - g2 * Jr) * G.transpose();
+    theta_ = theta_theta * dR_T.transpose() - (dR_theta_bg - g2 * Jr) * Jr.transpose();
+
+    // theta, then p' = p + v dt + a dt^2/2 and v' = v + a dt.
+    p_ +=
+        dt * (p_v_ + p_v_.transpose() + dt * v_) + h * (a_p + a_p.transpose() + dt * (a_v + a_v.transpose()) + h * a_a);
+    p_v_ += dt * (v_ + a_p.transpose() + dt * a_v.transpose()) + h * (a_v + dt * a_a);
+    v_ += dt * (a_v + a_v.transpose() + dt * a_a);
+    p_theta_ = (theta_p + dt * theta_v + h * theta_a).transpose();
+    v_theta_ = (theta_v + dt * theta_a).transpose();
+    const Matrix3d a_bg = gyro_bias_ * G - H_theta_bg;
+    p_bg_ += dt * v_bg_ + h * a_bg;
+    v_bg_ += dt * a_bg;
+    theta_bg_ = dR_theta_bg - gyro_bias_ * Jr;
+    p_ba_ += dt * v_ba_ - (h * accel_bias_) * M;
+    v_ba_ -= (dt * accel_bias_) * M;
+    gyro_bias_ += gyro_walk2;
+    accel_bias_ += accel_walk2;
+  }
+
+  StateMatrix matrix() const {
+    using namespace core;
+    StateMatrix P = StateMatrix::Zero();
+    const auto set = [&](int row, int column, const Matrix3d& block) {
+      P.block<3, 3>(row, column) = block;
+      P.block<3, 3>(column, row) = block.transpose();
+    };
+    set(kPosition, kPosition, 0.5 * (p_ + p_.transpose()));
+    set(kOrientation, kOrientation, 0.5 * (theta_ + theta_.transpose()));
+    set(kVelocity, kVelocity, 0.5 * (v_ + v_.transpose()));
+    set(kPosition, kOrientation, p_theta_);
+    set(kPosition, kVelocity, p_v_);
+    set(kVelocity, kOrientation, v_theta_);
+    set(kPosition, kGyroBias, p_bg_);
+    set(kOrientation, kGyroBias, theta_bg_);
+    set(kVelocity, kGyroBias, v_bg_);
+    set(kPosition, kAccelBias, p_ba_);
+    set(kVelocity, kAccelBias, v_ba_);
+    P.diagonal().segment<3>(kGyroBias).setConstant(gyro_bias_);
+    P.diagonal().segment<3>(kAccelBias).setConstant(accel_bias_);
+    return P;
+  }
+
+ private:
+  Matrix3d p_ = Matrix3d::Zero();
+  Matrix3d p_v_ = Matrix3d::Zero();
+  Matrix3d v_ = Matrix3d::Zero();
+  Matrix3d theta_ = Matrix3d::Zero();
+  Matrix3d p_theta_ = Matrix3d::Zero();
+  Matrix3d v_theta_ = Matrix3d::Zero();
+  Matrix3d p_bg_ = Matrix3d::Zero();
+  Matrix3d v_bg_ = Matrix3d::Zero();
+  Matrix3d theta_bg_ = Matrix3d::Zero();
+  Matrix3d p_ba_ = Matrix3d::Zero();
+  Matrix3d v_ba_ = Matrix3d::Zero();
+  double gyro_bias_ = 0.0;
+  double accel_bias_ = 0.0;
+};
 
 }  // namespace
 
@@ -59,28 +108,16 @@ Preintegration preintegrate(std::span<const core::ImuSample> samples, const core
 
   Preintegration result;
   result.bias = bias;
-  StateMatrix& P = result.covariance;
+  Covariance covariance;
   for (std::size_t i = 0; i + 1 < samples.size(); ++i) {
     const double dt = core::to_seconds(samples[i + 1].t_ns - samples[i].t_ns);
     const ImuStep step = advance(samples[i], samples[i + 1], bias, dt, result.increment);
+    covariance.advance(step, gyro2 / dt, accel2 / dt, gyro_walk2 * dt, accel_walk2 * dt);
     result.dt_s += dt;
-
-    apply_transition(step, P);
-    P.transposeInPlace();
-    apply_transition(step, P);
-    // One noise of variance sigma^2/dt a step: theta' gets -Jr dt n_g, a gets R1 [f1]x/2 Jr dt n_g - (R0 + R1)/2 n_a.
-    const Eigen::Matrix3d a_ng = step.half1 * step.Jr_dt;
-    const Eigen::Matrix3d a_cov =
-        (gyro2 / dt) * (a_ng * a_ng.transpose()) + (accel2 / dt) * (step.mean_R * step.mean_R.transpose());
-    const Eigen::Matrix3d theta_a_cov = (-gyro2 / dt) * (step.Jr_dt * a_ng.transpose());
-    P.block<3, 3>(kOrientation, kOrientation) += (gyro2 / dt) * (step.Jr_dt * step.Jr_dt.transpose());
-    add_noise_of_acceleration(dt, a_cov, theta_a_cov, P);
-    P.diagonal().segment<3>(kGyroBias).array() += gyro_walk2 * dt;
-    P.diagonal().segment<3>(kAccelBias).array() += accel_walk2 * dt;
   }
-  P = 0.5 * (P + P.transpose()).eval();
+  result.covariance = covariance.matrix();
   result.sqrt_information.setIdentity();
-  P.llt().matrixL().solveInPlace(result.sqrt_information);
+  result.covariance.llt().matrixL().solveInPlace(result.sqrt_information);
   return result;
 }
 

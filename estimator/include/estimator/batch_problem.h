@@ -14,6 +14,7 @@
 #include "estimator/factors/local_motion.h"
 #include "estimator/factors/parameter_blocks.h"
 #include "estimator/keyframes.h"
+#include "estimator/point_terms.h"
 
 namespace plumbline::estimator {
 
@@ -58,9 +59,15 @@ class BatchProblem {
   std::optional<core::PosteriorCovariance> posterior_covariance() const;
 
  private:
+  // Of the residual blocks [first, last) in the order in which they were added, without loss functions.
+  core::ResidualSum residual_sum(int first, int last) const;
+
   void add_priors();
   void add_inertial_factors();
   void add_points();
+  bool add_point(const PointModel& model, const std::vector<FrameTiming>& timings, const Track& track,
+                 Eigen::Vector3d& landmark);
+  double* landmark_block(Eigen::Vector3d& landmark) const;  // what of it is estimated
 
   const BatchInput& input_;
   BatchValues start_;
@@ -71,6 +78,8 @@ class BatchProblem {
   std::vector<Eigen::Vector3d> landmarks_;
   std::vector<std::size_t> landmark_tracks_;
   int observations_ = 0;
+  int inertial_begin_ = 0;  // the residual blocks: priors, then inertial, then visual ones
+  int visual_begin_ = 0;
   StateManifold state_manifold_;
   PoseManifold pose_manifold_;
   std::unique_ptr<ceres::Problem> problem_;

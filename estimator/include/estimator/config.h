@@ -7,17 +7,15 @@
 
 #include "core/calibration.h"
 #include "core/config.h"
+#include "estimator/factors/landmark.h"
+#include "estimator/factors/ray_chart.h"
 
 namespace plumbline::estimator {
 
 enum class EstimatorType { kBatch };
 inline constexpr std::array<std::string_view, 1> kEstimatorTypeNames = {"batch"};
-enum class TimingModel { kPropagated };
-inline constexpr std::array<std::string_view, 1> kTimingModelNames = {"propagated"};
-enum class ResidualType { kPinhole };
-inline constexpr std::array<std::string_view, 1> kResidualTypeNames = {"pinhole"};
-enum class LandmarkType { kBearingInverseDepth };
-inline constexpr std::array<std::string_view, 1> kLandmarkTypeNames = {"bearing_inverse_depth"};
+enum class TimingModel { kPropagated, kFeatureVelocity };
+inline constexpr std::array<std::string_view, 2> kTimingModelNames = {"propagated", "feature_velocity"};
 enum class Initialisation { kPrior };
 inline constexpr std::array<std::string_view, 1> kInitialisationNames = {"prior"};
 enum class LinearSolver { kAutomatic, kSparseSchur, kDenseSchur };
@@ -47,6 +45,7 @@ struct EstimatorConfig {
   LinearSolver solver = LinearSolver::kAutomatic;
   double keyframe_rate_hz = 10.0;
   std::optional<double> pixel_sigma_px;
+  std::optional<double> state_td_s;
   ImuNoiseOverride imu;
   EstimateWhat estimate;
   int max_iterations = 50;

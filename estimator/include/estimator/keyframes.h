@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,6 +17,7 @@ std::vector<std::size_t> select_keyframes(const std::vector<core::Frame>& frames
 struct TrackObservation {
   std::size_t keyframe = 0;  // index into the selection
   Eigen::Vector2d pixel;
+  std::optional<Eigen::Vector2d> velocity = std::nullopt;  // of the normalised coordinates, 1/s
 };
 
 // The first observation is the anchor's.
@@ -28,5 +30,9 @@ struct Track {
 // the observations at pixels that no ray of the camera falls on.
 std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes,
                                   const core::PinholeCamera& camera);
+
+// Leaves out the observations without an image velocity, and with them the tracks that fewer than two are left of:
+// taking 0 for a velocity that is not known would be a wrong one. Returns how many observations had none.
+int drop_without_velocity(std::vector<Track>& tracks);
 
 }  // namespace plumbline::estimator

@@ -18,7 +18,9 @@ namespace plumbline::eval {
 
 struct MetricsConfig {
   Alignment alignment = Alignment::kPosyaw;
-  int first_n = 0;  // poses that decide the alignment; 0: all
+  int first_n = 0;           // poses that decide the alignment; 0: all
+  double first_s = 0.0;      // or those up to so long after the first; 0: all. Not both.
+  double td_bound_s = 1e-3;  // td_convergence_s: what |td error| must stay within
 };
 
 struct SolverFigures {

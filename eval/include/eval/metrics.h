@@ -4,14 +4,23 @@
 //   ate_position_m        RMSE over the trajectory, aligned                  -
 //   ate_rotation_deg      likewise, geodesic angle                           -
 //   td_error_s            estimate - truth, middle row                       1 dof, where estimated
+//   td_first_error_s      likewise, first row: td_middle - readout/2         1 dof, from the joint covariance of both
 //   readout_error_s       estimate - truth                                   1 dof, where estimated
 //   extrinsic_position_m  |p_est - p_true| of T_B_C                          3 dof, where estimated
 //   extrinsic_rotation_deg  |Log(R_true^T R_est)| of T_B_C                   3 dof, where estimated
 //   extrinsic             m, as extrinsic_position_m                         6 dof, [position | orientation] jointly
-//   final_pose            m, |p_est - p_true| of the last state, unaligned   6 dof, [position | orientation] jointly
-//   final_velocity        m/s, norm of the error of the last state           3 dof
-//   final_bias            rad/s, norm of the last gyroscope bias' error      6 dof, [gyroscope | accelerometer] jointly
-// A joint block's units do not mix in a norm, so its value is that of its first three components.
+//   calibration           m, as extrinsic_position_m                         all of T_B_C, td, readout that is
+//   estimated final_pose            m, |p_est - p_true| of the last state, unaligned   6 dof, [position | orientation]
+//   jointly final_position        m, the same                                        3 dof final_orientation_deg
+//   |Log(R_true^T R_est)| of the last state           3 dof final_velocity        m/s, norm of the error of the last
+//   state           3 dof final_bias            rad/s, norm of the last gyroscope bias' error      6 dof, [gyroscope |
+//   accelerometer] jointly final_state           m, as final_pose                                   15 dof joint m, as
+//   final_pose                                   calibration and final_state jointly nis_visual            mean squared
+//   whitened residual at the solution     - nis_inertial          likewise; with noise as stated both are below 1,
+//                         since parameters were fitted to the residuals
+//   td_convergence_s      since the first estimated state: the first instant after which |td error| stays within
+//                         eval.td_bound_s for the rest; only where the estimator keeps a history of td
+// A joint block's units do not mix in a norm, so its value is that of the position in it.
 #pragma once
 
 #include <array>
@@ -27,7 +36,8 @@ struct Metric {
   std::string name;
   double value = 0.0;
   std::optional<double> nees = std::nullopt;
-  int nees_dof = 0;  // 0 where there is no NEES
+  int nees_dof = 0;       // 0 where there is no NEES
+  bool censored = false;  // what is waited for had not happened by the end, which is the value
 };
 
 struct MetricInfo {
@@ -38,18 +48,28 @@ struct MetricInfo {
   bool in_table = true;     // false: the value repeats another metric's, only the NEES is new
 };
 
-inline constexpr std::array<MetricInfo, 10> kMetrics = {{
+inline constexpr std::array<MetricInfo, 18> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
+    {"td_first_error_s", "td error, first row [us]", 1e6, true},
     {"readout_error_s", "readout error [us]", 1e6, true},
     {"extrinsic_position_m", "extrinsic position [mm]", 1e3},
     {"extrinsic_rotation_deg", "extrinsic rotation [deg]", 1.0},
     {"extrinsic", "extrinsic, joint", 1e3, false, false},
+    {"calibration", "calibration, joint", 1e3, false, false},
     {"final_pose", "final pose [mm]", 1e3},
+    {"final_position", "final position", 1e3, false, false},
+    {"final_orientation_deg", "final orientation [deg]", 1.0},
     {"final_velocity", "final velocity [mm/s]", 1e3},
     {"final_bias", "final gyro bias [deg/h]", 3600.0 * core::kDegreesPerRadian},
+    {"final_state", "final state, joint", 1e3, false, false},
+    {"joint", "calibration and state", 1e3, false, false},
+    {"nis_visual", "visual residuals, squared", 1.0, false, false},
+    {"nis_inertial", "inertial residuals, squared", 1.0, false, false},
 }};
+
+inline constexpr std::string_view kTdConvergence = "td_convergence_s";
 
 // A metric that is not listed is shown under its own name and unit.
 constexpr MetricInfo metric_info(std::string_view name) {

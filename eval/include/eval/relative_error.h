@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "eval/association.h"
 #include "eval/error_statistics.h"
@@ -35,7 +35,7 @@ std::string to_string(const Delta& delta);
 std::vector<Delta> parse_deltas(std::string_view text);
 
 // Zhang & Scaramuzza's sub-trajectories of a tenth to half of the path, and one second.
-std::vector<Delta> default_deltas();
+inline constexpr std::string_view kDefaultDeltas = "10%,20%,30%,40%,50%,1s";
 
 enum class PairStarts {
   kEveryPose,    // pairs overlap

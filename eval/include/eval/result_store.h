@@ -1,8 +1,9 @@
 // results.jsonl: one line a run, in the order of the runs, the same bytes whatever machine load, threads or shards.
 //   {"run_id", "cell", "trial", "seed", "ok", "status", "reason", "metrics": {NAME: {"value", "nees", "nees_dof"}},
 //    "solver": {"iterations", "final_cost", "cost_per_dof", "observations", "landmarks"}}
-// nees and nees_dof are there only where a NEES is. Doubles are written so that they read back to the last bit. What is
-// not finite is null, which only the solver's figures of a failed run may be. No wall-clock figures.
+// nees and nees_dof are there only where a NEES is, "censored": true only where it holds. Doubles are written so that
+// they read back to the last bit. What is not finite is null, which only the solver's figures of a failed run may be.
+// No wall-clock figures.
 #pragma once
 
 #include <cstdint>

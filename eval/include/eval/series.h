@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "core/estimate.h"
 #include "core/lie.h"
@@ -28,9 +28,18 @@ struct TimeOffsetPoint {
   double sigma_s = 0.0;
 };
 
+// NEES of what was known at an instant, unaligned.
+struct NeesPoint {
+  double t_s = 0.0;       // since the first estimated state
+  double pose = 0.0;      // 6 dof, [position | orientation]
+  double velocity = 0.0;  // 3 dof
+  double bias = 0.0;      // 6 dof, [gyroscope | accelerometer]
+};
+
 struct Series {
   std::vector<SeriesPoint> points;
   std::vector<TimeOffsetPoint> td;  // empty where the estimator keeps no history
+  std::vector<NeesPoint> nees;      // likewise
 };
 
 // The indices of at most `points` of the sorted stamps: those nearest to a uniform grid from the first to the last.
@@ -41,8 +50,8 @@ Series make_series(const std::vector<PosePair>& pairs, const TrajectoryErrors& e
                    const std::vector<core::TimeOffsetEstimate>& td_history, double td_s);
 
 // Columns as arrays: {"t_s": [...], "position_error_m": [x, y, z], "rotation_error_rad": [x, y, z],
-//  "estimate": [px, py, pz, qx, qy, qz, qw], "truth": likewise, "td": {"t_s", "td_error_s", "sigma_s"}},
-// each letter an array; td only where there is a history.
+//  "estimate": [px, py, pz, qx, qy, qz, qw], "truth": likewise, "td": {"t_s", "td_error_s", "sigma_s"},
+//  "nees": {"t_s", "pose", "velocity", "bias"}}, each letter an array; td and nees only where there is a history.
 nlohmann::ordered_json to_json(const Series& series);
 
 }  // namespace plumbline::eval

@@ -45,6 +45,11 @@ std::optional<Interval> rms_interval(const std::vector<double>& values, double c
 // For the mean, by Student's t; nothing for n < 2.
 std::optional<Interval> mean_interval(const std::vector<double>& values, double confidence);
 
+// For the p quantile of a continuous distribution, between two order statistics [x_(l), x_(u)], so at least
+// `confidence` without any assumption: the number of values below the quantile is binomial(n, p). Nothing where n is
+// too small for an end on either side.
+std::optional<Interval> quantile_interval(std::vector<double> values, double p, double confidence);
+
 // For the probability of a success, from `successes` of n >= 1: Clopper & Pearson 1934.
 Interval binomial_interval(int successes, int n, double confidence);
 

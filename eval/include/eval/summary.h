@@ -1,8 +1,15 @@
 // The trials of one cell in a few figures. Figures are over the trials that are ok; n counts all of them.
 //   mean, median (signed where the quantity is), rmse = sqrt(mean of squares), std of the sample
-//   rmse_ci95   exact for signed Gaussian errors, else by rms_interval (eval/statistics.h); with two trials at least
+//   mean_ci95   Student's t, of signed quantities: their bias
+//   rmse_ci95   exact for signed Gaussian errors, else by rms_interval (eval/statistics.h), from kBootstrapTrials on by
+//               BCa (eval/bootstrap.h), from 10,000 on, where all agree, by rms_interval again
+//   q05, q95    empirical quantiles
 //   nees_mean   not divided by the degrees of freedom, and the 95 % band of that mean over n consistent trials
-// A NEES is claimed only where every trial is ok: those that fail would have been the worst.
+//   within_3_sigma  share of trials in the 99.73 % region of the stated covariance, NEES <= chi2inv(0.9973, dof), for
+//               a single parameter |e| <= 3 sigma; with Clopper and Pearson's interval. 0.9973 is expected.
+//   nis         sum of squared whitened residuals over all trials, a chi-square variable of sum(residuals - parameters)
+//               degrees of freedom where the noise is as the estimator believes; divided by these, with its 95 % band
+// A NEES or NIS is claimed only where every trial is ok: those that fail would have been the worst.
 #pragma once
 
 #include <optional>
@@ -20,6 +27,21 @@ struct NeesSummary {
   int dof = 0;
   double mean = 0.0;
   Interval band95;
+  double within_3_sigma = 0.0;
+  Interval within_3_sigma_ci95;
+};
+
+// How long something took, over trials in some of which it did not happen.
+struct ConvergenceSummary {
+  int n_converged = 0;
+  Interval share_ci95;
+  std::optional<double> median_s;  // of all trials, those without counted as later; nothing where that is not finite
+};
+
+struct NisSummary {
+  double dof = 0.0;  // over all trials
+  double mean = 0.0;
+  Interval band95;
 };
 
 struct MetricSummary {
@@ -28,6 +50,9 @@ struct MetricSummary {
   double rmse = 0.0;
   double median = 0.0;
   std::optional<double> std;  // nothing for a single trial
+  double q05 = 0.0;
+  double q95 = 0.0;
+  std::optional<Interval> mean_ci95;
   std::optional<Interval> rmse_ci95;
   std::optional<NeesSummary> nees;
 };
@@ -37,15 +62,19 @@ struct CellSummary {
   int n = 0;
   int n_ok = 0;
   std::vector<MetricSummary> metrics;  // empty where no trial is ok
-  std::string note;                    // why there is no NEES where there might have been
+  std::optional<ConvergenceSummary> td_convergence;
+  std::optional<NisSummary> nis;
+  std::string note;  // why there is no NEES where there might have been
 };
 
 // Throws std::invalid_argument where two ok rows do not hold the same metrics, with and without NEES alike: they are
 // not of one cell.
 CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes);
 
-// {"axes", "n", "n_ok", "metrics": {NAME: {"mean", "rmse", "median", "std", "rmse_ci95", "nees_dof", "nees_mean",
-//  "nees_band95"}}, "note"}; what is not there is left out.
+// {"axes", "n", "n_ok", "metrics": {NAME: {"mean", "rmse", "median", "std", "q05", "q95", "mean_ci95", "rmse_ci95",
+//  "nees_dof", "nees_mean", "nees_band95", "within_3_sigma", "within_3_sigma_ci95"}},
+//  "td_convergence": {"n_converged", "share_ci95", "median_s"}, "nis": {"dof", "mean", "band95"}, "note"}; what is not
+//  there is left out.
 nlohmann::ordered_json to_json(const CellSummary& cell);
 
 }  // namespace plumbline::eval

@@ -10,7 +10,7 @@
 
 namespace plumbline::sim {
 
-// offset + sum_i amplitude_i sin(omega_i t + phase_i)
+// offset + slope t + sum_i amplitude_i sin(omega_i t + phase_i)
 struct SinusoidSum {
   struct Term {
     double amplitude = 0.0;
@@ -18,6 +18,7 @@ struct SinusoidSum {
     double phase_rad = 0.0;
   };
   double offset = 0.0;
+  double slope = 0.0;
   std::vector<Term> terms;
 
   // The value and its first three derivatives.
@@ -30,7 +31,7 @@ class HarmonicTrajectory final : public Trajectory {
   struct Shape {
     std::array<SinusoidSum, 3> position;  // x, y, z
     SinusoidSum yaw;                      // unused where the yaw follows the path
-    SinusoidSum pitch;                    // stays away from +-90 degrees
+    SinusoidSum pitch;
     SinusoidSum roll;
     bool yaw_follows_path = false;  // needs a horizontal velocity that never vanishes
   };
@@ -44,11 +45,7 @@ class HarmonicTrajectory final : public Trajectory {
   Shape shape_;
 };
 
-// Six independent sums of five sinusoids, drawn from the shared stream of the experiment, as a person moves a
-// handheld device: rms speed and rate as configured.
-HarmonicTrajectory::Shape handheld_shape(const HandheldConfig& config, core::TrialId id);
-HarmonicTrajectory::Shape circle_shape(const LoopConfig& config);
-// Lemniscate of Gerono: x = r sin wt, y = r/2 sin 2wt.
-HarmonicTrajectory::Shape figure_eight_shape(const LoopConfig& config);
+// Sums that the user gives.
+HarmonicTrajectory::Shape sinusoids_shape(const SinusoidsConfig& config);
 
 }  // namespace plumbline::sim

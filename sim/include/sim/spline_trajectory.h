@@ -1,14 +1,13 @@
-// Quintic (C^4) uniform B-spline fitted to recorded poses: positions in R^3, orientations as a cumulative B-spline on
+// Quintic (C^4) uniform B-spline: positions in R^3, orientations as a cumulative B-spline on
 // SO(3).
 //   p(t) = sum_j B_j(u) p_{i+j}            R(t) = R_i prod_{j=1..5} Exp(lambda_j(u) Log(R_{i+j-1}^T R_{i+j}))
 // Sommer, Usenko, Schubert, Demmel, Cremers, "Efficient derivative computation for cumulative B-splines on Lie
-// groups", CVPR 2020 (blending matrix eq. 5, rates and accelerations by the recursions of section 4).
+// groups", CVPR 2020 (rates and accelerations by the recursions of section 4).
 #pragma once
 
 #include <array>
 #include <vector>
 
-#include "core/pose_file.h"
 #include "sim/trajectory.h"
 
 namespace plumbline::sim {
@@ -34,17 +33,5 @@ class SplineTrajectory final : public Trajectory {
   std::vector<Eigen::Vector3d> steps_;  // Log(R_{i}^T R_{i+1})
   double knot_interval_s_;
 };
-
-struct SplineFit {
-  SplineTrajectory trajectory;
-  FitResiduals residuals;
-};
-
-// Least-squares fit to the poses in [start_s, start_s + duration_s] after the first pose of the file (and a few knots
-// beyond, where the file has them). Time 0 of the trajectory is start_s into the file. The orientation's fit repeats
-// the linear one on the tangent space, with the basis values as its Jacobian, until the update vanishes; that is exact
-// to second order in the rotation between neighbouring knots.
-// Throws core::DataError where the file is too short or has a gap wider than largest_gap_s.
-SplineFit fit_spline(const std::vector<core::StampedPose>& poses, const TrajectoryConfig& config, double duration_s);
 
 }  // namespace plumbline::sim

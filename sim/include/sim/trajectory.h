@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/lie.h"
+#include "core/pose_formats.h"
 #include "core/random.h"
 #include "sim/scenario.h"
 
@@ -33,12 +34,20 @@ class Trajectory {
 // Throws core::DataError where a pose file cannot be used.
 std::unique_ptr<const Trajectory> make_trajectory(const TrajectoryConfig& config, double duration_s, core::TrialId id);
 
-// How far the poses of a spline's file lie from it, over the span of the recording; nothing for other trajectories.
+// How far the poses of a spline's file lie from it, over the span of the recording.
 struct FitResiduals {
   double position_rms_m = 0.0;
   double rotation_rms_rad = 0.0;
 };
-std::optional<FitResiduals> fit_residuals(const TrajectoryConfig& config, double duration_s);
+
+// What became of a pose file; nothing for other trajectories.
+struct SplineReport {
+  core::PoseFormat format = core::PoseFormat::kTum;
+  double from_s = 0.0;  // the part of the file that the spline is of, after its first pose
+  double to_s = 0.0;
+  FitResiduals residuals;
+};
+std::optional<SplineReport> spline_report(const TrajectoryConfig& config, double duration_s);
 
 // How strongly a trajectory moves, over a grid of 100 Hz: what makes td observable, and what tells a fit that follows
 // the noise of its poses.

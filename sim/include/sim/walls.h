@@ -22,6 +22,16 @@ struct Wall {
   bool solid(const Eigen::Vector2d& ab) const;
 };
 
+// The vertical wall that stands over the line from `from` to `to`; its normal is on the right of that way.
+Wall upright_wall(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double bottom_z, double top_z);
+
+// The level rectangle corner + a u + b v at height z, for u and v at right angles, v on the left of u; its normal
+// points up.
+Wall level_face(const Eigen::Vector2d& corner, const Eigen::Vector2d& u, const Eigen::Vector2d& v, double z);
+
+// The same wall seen from the other side: its normal points there.
+Wall turned_round(const Wall& wall);
+
 // Whether the straight line from the camera to the point passes through the wall. A point within a micrometre of the
 // wall's plane is on it, and seen.
 bool occludes(const Wall& wall, const Eigen::Vector3d& camera_W, const Eigen::Vector3d& P_W);

@@ -23,8 +23,35 @@ struct World {
   }
 };
 
-// `shell`: each landmark lies nearest_m to farthest_m (uniform) from where the body is at a random time, in a random
-// direction.
+// Sized by the path; neither body nor camera passes through a wall. Throws core::DataError where that cannot be.
 World make_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
+
+// The positions of the body, then those of the camera, at 100 Hz; the spacing of neighbours is what a wall's clearance
+// must exceed.
+struct Path {
+  std::vector<Eigen::Vector3d> body_W;
+  std::vector<Eigen::Vector3d> camera_W;
+
+  std::vector<Eigen::Vector3d> all() const;
+};
+Path sample_path(const ScenarioConfig& scenario, const Trajectory& trajectory);
+
+// Each landmark lies nearest_m to farthest_m (uniform) from where the body is at a random time, in a random direction.
+World shell_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
+
+// Each is at a random pixel and depth (uniform) of the camera's middle row at a random time.
+World frustum_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
+
+// Uniform on squares whose centres lie as the shell's landmarks do and whose normals are within about 45 degrees of the
+// direction to the path.
+World planes_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
+
+// Uniform on walls, floor and ceiling of a house about the path. Walls divide it where the path comes near them least,
+// within a quarter of a room of equal division, and open wherever the path comes nearer than the clearance.
+World rooms_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
+
+// Uniform on walls, floor and ceiling of the cells of a square grid that the path with its clearance enters. The grid
+// is turned and shifted so that they are few: straight parts of the path are corridors one cell wide.
+World corridor_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
 
 }  // namespace plumbline::sim

@@ -1,4 +1,4 @@
-// The keys of scenario.world: the landmarks that there are.
+// The keys of scenario.world: the landmarks that there are, and the walls.
 #pragma once
 
 #include <array>
@@ -10,14 +10,42 @@
 
 namespace plumbline::sim {
 
-enum class WorldType { kShell };
-inline constexpr std::array<std::string_view, 1> kWorldTypeNames = {"shell"};
+enum class WorldType { kShell, kFrustum, kPlanes, kRooms, kCorridor };
+inline constexpr std::array<std::string_view, 5> kWorldTypeNames = {"shell", "frustum", "planes", "rooms", "corridor"};
+
+// Of rooms and corridors.
+struct WallsConfig {
+  bool occlusion = true;  // of planes too
+  double clearance_m = 0.4;
+  double floor_below_m = 1.4;
+  double ceiling_above_m = 1.0;
+};
+
+struct RoomsConfig {
+  double longest_side_m = 6.0;
+  double margin_m = 1.0;
+  double door_width_m = 0.9;
+  double door_height_m = 2.0;
+};
+
+struct CorridorConfig {
+  double width_m = 2.0;
+};
+
+struct PlanesConfig {
+  int count = 30;
+  double side_m = 3.0;
+};
 
 struct WorldConfig {
   WorldType type = WorldType::kShell;
   int landmarks = 4000;
   double nearest_m = 3.0;
   double farthest_m = 8.0;
+  WallsConfig walls;
+  RoomsConfig rooms;
+  CorridorConfig corridor;
+  PlanesConfig planes;
 };
 
 void visit(core::ConfigVisitor& v, WorldConfig& c);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "eval/alignment.h"
+#include "eval/relative_error.h"
 
 namespace plumbline::tools {
 
@@ -47,13 +48,24 @@ struct EstimateOptions {
 int estimate(const EstimateOptions& options);
 
 struct EvaluateOptions {
-  std::filesystem::path estimate;  // a TUM file, or a folder with estimate.tum
-  std::filesystem::path truth;     // a TUM file, or a dataset with its truth
+  std::filesystem::path estimate;  // of a run, or a folder of many (tools/trajectory_files.h)
+  std::filesystem::path truth;
   eval::Alignment alignment = eval::Alignment::kPosyaw;
   int first_n = 0;
+  double first_s = 0.0;
+  std::string deltas{eval::kDefaultDeltas};  // of the relative errors
   bool json = false;
 };
 int evaluate(const EvaluateOptions& options);
+
+struct CompareOptions {
+  std::filesystem::path a;  // folders of results
+  std::filesystem::path b;
+  std::vector<std::string> metrics;  // all of tables where empty
+  double alpha = 0.05;
+  bool json = false;
+};
+int compare(const CompareOptions& options);  // kExitWorse where B is significantly worse
 
 struct ReplayOptions {
   std::filesystem::path results;  // the folder of a run

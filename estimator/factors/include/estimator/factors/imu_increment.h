@@ -13,6 +13,7 @@
 #include "core/measurements.h"
 #include "core/state.h"
 #include "core/time.h"
+#include "estimator/factors/skew_product.h"
 
 namespace plumbline::estimator {
 
@@ -29,14 +30,17 @@ struct ImuIncrement {
   Eigen::Matrix3d p_ba = Eigen::Matrix3d::Zero();
 };
 
-// What one step was made of, for those who carry more along with it.
+// One step as a linear map of small changes at its start, of orientation (theta, on the right) and biases:
+//   theta' = dR^T theta - Jr_dt b_g            a = -H theta + G b_g - M b_a
+//   H = R0 [f0]x/2 + R1 [f1]x/2 dR^T,   G = R1 [f1]x/2 Jr_dt,   M = (R0 + R1)/2
+// White noise of the samples acts as one more bias.
 struct ImuStep {
   double dt = 0.0;
-  Eigen::Matrix3d dR_T;    // Exp(phi)^T
-  Eigen::Matrix3d Jr_dt;   // Jr(phi) dt
-  Eigen::Matrix3d half0;   // R0 [a0 - b_a]x / 2
-  Eigen::Matrix3d half1;   // R1 [a1 - b_a]x / 2
-  Eigen::Matrix3d mean_R;  // (R0 + R1) / 2
+  Eigen::Matrix3d dR_T;   // Exp(phi)^T
+  Eigen::Matrix3d Jr_dt;  // Jr(phi) dt
+  Eigen::Matrix3d H;
+  Eigen::Matrix3d G;
+  Eigen::Matrix3d M;
 };
 
 inline ImuStep advance(const core::ImuSample& s0, const core::ImuSample& s1, const core::ImuBias& bias, double dt,
@@ -46,21 +50,25 @@ inline ImuStep advance(const core::ImuSample& s0, const core::ImuSample& s1, con
   const Eigen::Matrix3d R1 = x.R * dR;
   const Eigen::Vector3d f0 = s0.accel_m_s2 - bias.accel_m_s2;
   const Eigen::Vector3d f1 = s1.accel_m_s2 - bias.accel_m_s2;
-  const Eigen::Vector3d a = 0.5 * (x.R * f0 + R1 * f1);
-  const ImuStep step{.dt = dt,
-                     .dR_T = dR.transpose(),
-                     .Jr_dt = core::right_jacobian(phi) * dt,
-                     .half0 = 0.5 * x.R * core::skew(f0),
-                     .half1 = 0.5 * R1 * core::skew(f1),
-                     .mean_R = 0.5 * (x.R + R1)};
+  const Eigen::Vector3d f1_start = dR * f1;  // R1 [f1]x dR^T = R0 [dR f1]x
+  const Eigen::Vector3d a = 0.5 * (x.R * (f0 + f1_start));
+  ImuStep step;
+  step.dt = dt;
+  step.dR_T = dR.transpose();
+  step.Jr_dt = core::right_jacobian(phi) * dt;
+  step.H = 0.5 * times_skew(x.R, f0 + f1_start);
+  step.G.noalias() = 0.5 * times_skew(R1, f1) * step.Jr_dt;
+  step.M = 0.5 * (x.R + R1);
 
-  const Eigen::Matrix3d R_bg = step.dR_T * x.R_bg - step.Jr_dt;
-  const Eigen::Matrix3d a_bg = -step.half0 * x.R_bg - step.half1 * R_bg;
+  Eigen::Matrix3d a_bg = step.G;
+  a_bg.noalias() -= step.H * x.R_bg;
+  Eigen::Matrix3d R_bg = -step.Jr_dt;
+  R_bg.noalias() += step.dR_T * x.R_bg;
   const double half_dt2 = 0.5 * dt * dt;
   x.p_bg += dt * x.v_bg + half_dt2 * a_bg;
-  x.p_ba += dt * x.v_ba - half_dt2 * step.mean_R;
+  x.p_ba += dt * x.v_ba - half_dt2 * step.M;
   x.v_bg += dt * a_bg;
-  x.v_ba -= dt * step.mean_R;
+  x.v_ba -= dt * step.M;
   x.R_bg = R_bg;
   x.p += dt * x.v + half_dt2 * a;
   x.v += dt * a;

@@ -1,83 +1,93 @@
-// Point observations under a rolling shutter with time offset, camera timing `propagated`, landmark
-// `bearing_inverse_depth`: (x, y, lambda), the bearing (x, y, 1) in the anchor camera at the time when the anchor saw
-// the landmark, and the inverse of its depth there.
+// Point observations with camera timing `propagated`: time offset and rolling shutter by the trajectory.
 //
-// The observation of row v in frame k is made at s_k + tau, s_k the instant of the frame's state,
-//   tau_k(v) = (t_cam,k - s_k) + td + (v - rows/2)/rows * readout
-// where the body is at T_k(tau) (local_motion.h). With b = (x, y, 1), every length times lambda, so that a landmark at
-// infinity is as good as any:
-//   B = R_c b + lambda t_c            body frame of the anchor, v_a = the row of b, tau_a = tau_i(v_a)
-//   W = R_i(tau_a) B + lambda p_i(tau_a)
-//   X = R_j(tau_b)^T (W - lambda p_j(tau_b))
-//   q = R_c^T (X - lambda t_c)        r = (project(q) - z) / sigma_px
-//
-// The row v_b of the observer is the *predicted* one, v_b = h_v(tau_j(v_b)): the measured row is noisy, and its noise
-// would enter the time. By the implicit function theorem, with k = h_v' readout/rows (h' the image velocity, px/s),
-//   dv_b/dx = (dh_v/dx at fixed tau_b) / (1 - k)      dr/dx = M (dh/dx at fixed tau_b) / sigma
-//   M = I + h' [0 1] (readout/rows) / (1 - k)
+// Both ends of the chain of point_chain.h move: T_j is the observer's body when its predicted row is exposed
+// (rolling_view.h), T_i the anchor's when that of its bearing is, s_i + tau_i,
+//   tau_i = (t_cam,i - s_i) + td + (v - rows/2)/rows * readout
+// v the row of the estimated bearing (bearing_inverse_depth), or as measured (fixed_bearing).
+//   r = h(q) - h(observed),  h of ray_chart.h
+//   dr/dtd = J_W (R_i (omega_i x B) + lambda v_i) + h' M q'_j,   dr/dreadout the same, each end times (v - rows/2)/rows
 #pragma once
-
-#include <memory>
 
 #include <ceres/sized_cost_function.h>
 
 #include "core/camera.h"
-#include "estimator/factors/local_motion.h"
+#include "estimator/factors/landmark.h"
 #include "estimator/factors/parameter_blocks.h"
+#include "estimator/factors/ray_chart.h"
+#include "estimator/factors/rolling_view.h"
+#include "estimator/factors/timed_body.h"
 
 namespace plumbline::estimator {
 
-// A frame as the factors see it.
-struct FrameTiming {
-  std::shared_ptr<const LocalMotion> motion;  // about the instant of the frame's state
-  double offset_s = 0.0;                      // t_cam,k - s_k
-};
-
 struct CameraModel {
-  core::PinholeCamera camera;
+  core::PinholeCamera camera = {};
   double pixel_sigma_px = 1.0;
   double gravity_m_s2 = 9.81;
+  ResidualType residual = ResidualType::kPinhole;
 };
 
 // Blocks: anchor state, observer state, extrinsics, td, readout, landmark. False (Ceres rejects the step) where the
 // landmark is not in front of the observer, or a time leaves the range of the local motion.
-class PropagatedPointFactor final
-    : public ceres::SizedCostFunction<2, kStateSize, kStateSize, kPoseSize, 1, 1, kLandmarkSize> {
+template <LandmarkType kLandmark>
+class PropagatedPoint final
+    : public ceres::SizedCostFunction<2, kStateSize, kStateSize, kPoseSize, 1, 1, landmark_size(kLandmark)> {
  public:
-  PropagatedPointFactor(const CameraModel& model, FrameTiming anchor, FrameTiming observer,
-                        const Eigen::Vector2d& observed_pixel)
-      : model_(model), anchor_(std::move(anchor)), observer_(std::move(observer)), observed_pixel_(observed_pixel) {}
+  PropagatedPoint(const CameraModel& model, FrameTiming anchor, FrameTiming observer,
+                  const Eigen::Vector2d& observed_pixel)
+    requires(kLandmark == LandmarkType::kBearingInverseDepth)
+      : PropagatedPoint(model, std::move(anchor), std::move(observer), observed_pixel, Fixed{}) {}
+
+  PropagatedPoint(const CameraModel& model, FrameTiming anchor, FrameTiming observer,
+                  const Eigen::Vector2d& observed_pixel, const Eigen::Vector2d& anchor_pixel)
+    requires(kLandmark == LandmarkType::kFixedBearing)
+      : PropagatedPoint(model, std::move(anchor), std::move(observer), observed_pixel,
+                        Fixed{model.camera.unproject(anchor_pixel), anchor_pixel.y()}) {}
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
-  CameraModel model_;
+  // The anchor's observation where it is taken as exact.
+  struct Fixed {
+    Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();
+    double row = 0.0;
+  };
+  struct Anchor;  // bearing, inverse depth and row, from the landmark's block
+
+  PropagatedPoint(const CameraModel& model, FrameTiming anchor, FrameTiming observer,
+                  const Eigen::Vector2d& observed_pixel, const Fixed& fixed)
+      : camera_(model.camera),
+        chart_(model.residual, model.camera, model.pixel_sigma_px, observed_pixel),
+        gravity_m_s2_(model.gravity_m_s2),
+        anchor_(std::move(anchor)),
+        observer_(std::move(observer)),
+        measured_row_(observed_pixel.y()),
+        fixed_(fixed) {}
+
+  bool find_anchor(const double* landmark, Anchor& anchor) const;
+
+  core::PinholeCamera camera_;
+  RayChart chart_;
+  double gravity_m_s2_;
   FrameTiming anchor_;
   FrameTiming observer_;
-  Eigen::Vector2d observed_pixel_;
+  double measured_row_;
+  Fixed fixed_;
 };
 
-// The anchor's own observation: r = (project(x, y, 1) - z) / sigma_px. Block: landmark.
+extern template class PropagatedPoint<LandmarkType::kBearingInverseDepth>;
+extern template class PropagatedPoint<LandmarkType::kFixedBearing>;
+using PropagatedPointFactor = PropagatedPoint<LandmarkType::kBearingInverseDepth>;
+
+// The anchor's own observation of a landmark bearing_inverse_depth: r = h((x, y, 1)) - h(observed). Block: landmark.
 class AnchorPointFactor final : public ceres::SizedCostFunction<2, kLandmarkSize> {
  public:
   AnchorPointFactor(const CameraModel& model, const Eigen::Vector2d& observed_pixel)
-      : model_(model), observed_pixel_(observed_pixel) {}
+      : chart_(model.residual, model.camera, model.pixel_sigma_px, observed_pixel) {}
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
-  CameraModel model_;
-  Eigen::Vector2d observed_pixel_;
+  RayChart chart_;
 };
-
-// The body at a time near a state: T_W_B(tau) and its rates.
-struct TimedBody {
-  LocalPose local;
-  Eigen::Matrix3d R;         // R_W_B(tau)
-  Eigen::Vector3d p;         // p_W_B(tau)
-  Eigen::Vector3d velocity;  // dp/dtau
-};
-bool body_at(const LocalMotion& motion, const core::State& state, double gravity_m_s2, double tau_s, TimedBody& body,
-             LocalPoseJacobians* jacobians = nullptr);
 
 }  // namespace plumbline::estimator
