@@ -113,7 +113,8 @@ TEST(Consistency, PointResidualsAtTheTruthAreTheSimulatedPixelNoise) {
   for (const estimator::Track& track : estimator::collect_tracks(log.frames, keyframes, log.camera)) {
     const std::size_t anchor = track.observations.front().keyframe;
     const Eigen::Vector3d& P_W = s.truth.landmarks_W[static_cast<std::size_t>(s.truth.track_landmark.at(track.id))];
-    const sim::FrameView view(*trajectory, log.camera, rig, core::to_seconds(log.frames[keyframes[anchor]].t_cam_ns));
+    const sim::FrameView view(*trajectory, log.camera, rig, sim::half_angle_of_view_rad(log.camera),
+                              core::to_seconds(log.frames[keyframes[anchor]].t_cam_ns));
     const auto exposure = view.expose(P_W);
     ASSERT_TRUE(exposure.has_value());
     Eigen::Vector3d landmark = log.camera.unproject(exposure->pixel);

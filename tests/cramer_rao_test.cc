@@ -81,7 +81,7 @@ class Bound : public ::testing::Test {
                                 .noise = estimator::believed_noise(config, log().imu_noise, log().pixel_sigma_px),
                                 .keyframes = every_second_frame(log()),
                                 .tracks = {}};
-    input.tracks = estimator::collect_tracks(log().frames, input.keyframes);
+    input.tracks = estimator::collect_tracks(log().frames, input.keyframes, log().camera);
     return *estimator::BatchProblem(input, true_values(input, simulation_.truth)).posterior_covariance();
   }
   CramerRaoBound bound(BoundOptions options) const {

@@ -30,8 +30,8 @@ TEST(Streams, TheListIsComplete) {
   EXPECT_EQ(used, std::set<std::string>(kStreams.begin(), kStreams.end()));
 }
 
-// Of n independent pairs the correlation has a standard deviation of 1/sqrt(n). The largest of some 200 correlations
-// exceeds 4 of these by chance in 1 of 80 choices of the seed.
+// Of n independent pairs the correlation has a standard deviation of 1/sqrt(n). The largest of some 400 correlations
+// exceeds 4 of these by chance in 1 of 40 choices of the seed.
 TEST(Streams, NoTwoAreCorrelated) {
   constexpr int kIndices = 5000;  // of four numbers
   std::vector<std::vector<double>> draws;

@@ -1,5 +1,10 @@
 #include "estimator/estimate.h"
 
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include <fmt/format.h>
 
 #include "core/error.h"
@@ -12,6 +17,22 @@ void require_positive(double value, std::string_view key, std::string_view meani
   if (!(value > 0.0)) {
     throw core::ConfigError(fmt::format("{}: must be > 0 for the estimator ({} is {})", key, meaning, value));
   }
+}
+
+// Between two samples the IMU is taken as linear. Over a longer gap that says nothing of the motion any more, and no
+// noise density tells how wrong it is.
+constexpr double kLargestImuGapS = 0.1;
+
+// The reason not to estimate, if there is one.
+std::optional<std::string> gap_in_imu(const std::vector<core::ImuSample>& imu) {
+  for (std::size_t i = 1; i < imu.size(); ++i) {
+    const double gap_s = core::to_seconds(imu[i].t_ns - imu[i - 1].t_ns);
+    if (gap_s > kLargestImuGapS) {
+      return fmt::format("no IMU samples for {:.3f} s after {} ns, the longest gap that is bridged is {} s", gap_s,
+                         imu[i - 1].t_ns, kLargestImuGapS);
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -35,6 +56,12 @@ void require_usable(const BelievedNoise& noise, const core::CalibrationSigmas& s
 core::EstimateLog estimate(const core::MeasurementLog& log, const EstimatorConfig& config) {
   require_usable(believed_noise(config, log.imu_noise, log.pixel_sigma_px), log.prior.calibration_sigma,
                  config.estimate);
+  if (auto reason = gap_in_imu(log.imu)) {
+    core::EstimateLog failed;
+    failed.status = core::SolveStatus::kFailedInitialisation;
+    failed.reason = std::move(*reason);
+    return failed;
+  }
   switch (config.type) {
     case EstimatorType::kBatch:
       return estimate_batch(log, config);
