@@ -57,7 +57,8 @@ double acceleration(const std::vector<double>& values, const Statistic& statisti
 Interval bca_interval(const std::vector<double>& values, const Statistic& statistic, double confidence,
                       std::uint64_t seed) {
   if (std::ssize(values) < kBootstrapTrials) throw std::invalid_argument("bca_interval: at least 200 values");
-  if (!(confidence > 0.0 && confidence < 1.0)) throw std::invalid_argument("bca_interval: 0 < confidence < 1");
+  const bool is_probability = confidence > 0.0 && confidence < 1.0;
+  if (!is_probability) throw std::invalid_argument("bca_interval: 0 < confidence < 1");
   const double observed = statistic(values);
   const std::vector<double> statistics = resampled(values, statistic, seed);
   if (statistics.front() == statistics.back()) return {observed, observed};

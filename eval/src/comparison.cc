@@ -68,16 +68,16 @@ PairedTrials pair_trials(const CellOutcomes& a, const CellOutcomes& b) {
   return pairs;
 }
 
-std::optional<std::size_t> position(const std::vector<std::string>& names, const std::string& name) {
-  const auto it = std::find(names.begin(), names.end(), name);
-  return it == names.end() ? std::nullopt : std::optional(static_cast<std::size_t>(it - names.begin()));
+// names.size() where it is not among them.
+std::size_t position(const std::vector<std::string>& names, const std::string& name) {
+  return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
 std::vector<std::string> common_metrics(const CellOutcomes& a, const CellOutcomes& b,
                                         const std::vector<std::string>& wanted) {
   std::vector<std::string> names;
   for (const std::string& name : wanted.empty() ? a.metrics : wanted) {
-    const bool both = position(a.metrics, name) && position(b.metrics, name);
+    const bool both = position(a.metrics, name) < a.metrics.size() && position(b.metrics, name) < b.metrics.size();
     if (!wanted.empty() && !both) throw core::DataError(fmt::format("not both hold a metric '{}'", name));
     const bool in_table = metric_info(name).in_table && name != kTdConvergence;
     if (both && (!wanted.empty() || in_table)) names.push_back(name);
@@ -144,8 +144,8 @@ Compared compare_cell(const CellOutcomes& a, const CellOutcomes& b, const std::v
   if (cell.n_ok_a == 0 || cell.n_ok_b == 0) return result;
   for (const std::string& name : common_metrics(a, b, wanted)) {
     std::vector<double> log_ratios;
-    cell.metrics.push_back(compare_metric(name, values_of(pairs, true, *position(a.metrics, name)),
-                                          values_of(pairs, false, *position(b.metrics, name)), log_ratios));
+    cell.metrics.push_back(compare_metric(name, values_of(pairs, true, position(a.metrics, name)),
+                                          values_of(pairs, false, position(b.metrics, name)), log_ratios));
     result.log_ratios.push_back(std::move(log_ratios));
   }
   return result;

@@ -92,7 +92,7 @@ double walsh_average(const std::vector<double>& d, std::int64_t k) {
   if (walsh_averages_up_to(d, lo) >= k) return lo;
   for (;;) {  // up_to(lo) < k <= up_to(hi)
     const double middle = lo + 0.5 * (hi - lo);
-    if (!(lo < middle && middle < hi)) return hi;
+    if (middle <= lo || middle >= hi) return hi;
     (walsh_averages_up_to(d, middle) >= k ? hi : lo) = middle;
   }
 }
@@ -145,7 +145,8 @@ double hodges_lehmann(const std::vector<double>& differences) {
 }
 
 std::optional<Interval> hodges_lehmann_interval(const std::vector<double>& differences, double confidence) {
-  if (!(confidence > 0.0 && confidence < 1.0)) throw std::invalid_argument("signed rank: 0 < confidence < 1");
+  const bool is_probability = confidence > 0.0 && confidence < 1.0;
+  if (!is_probability) throw std::invalid_argument("signed rank: 0 < confidence < 1");
   const std::vector<double> d = sorted(differences);
   const std::int64_t c = critical_rank_sum(static_cast<int>(d.size()), 0.5 * (1.0 - confidence));
   if (c < 0) return std::nullopt;

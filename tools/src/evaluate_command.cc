@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
@@ -66,12 +67,12 @@ void print_relative(const std::vector<eval::RelativeErrors>& relative) {
 void print_axes(const Scored& scored) {
   const eval::TrajectoryErrors& e = scored.errors;
   const auto& consistency = scored.consistency.consistency;
-  fmt::print("\n{:<22}{:>12}{:>12}{:>12}\n", "axis", "mean", "rmse", consistency ? "in 3 sigma" : "");
+  fmt::print("\n{:<22}{:>12}{:>12}{}\n", "axis", "mean", "rmse", consistency ? "  in 3 sigma" : "");
   for (int i = 0; i < 6; ++i) {
     const bool position = i < 3;
     const eval::AxisStatistics& axes = position ? e.position_axes_m : e.rotation_axes_deg;
-    const std::string share = consistency ? fmt::format("{:.1f} %", 100.0 * consistency->within_3_sigma(i)) : "";
-    fmt::print("{:<22}{:>12.6f}{:>12.6f}{:>12}\n",
+    const std::string share = consistency ? fmt::format("{:>10.1f} %", 100.0 * consistency->within_3_sigma(i)) : "";
+    fmt::print("{:<22}{:>12.6f}{:>12.6f}{}\n",
                fmt::format("{} {}", position ? "position [m]" : "rotation [deg]", "xyz"[i % 3]), axes.mean(i % 3),
                axes.rmse(i % 3), share);
   }
@@ -110,7 +111,7 @@ void print_run(const Scored& scored, const EvaluateOptions& options) {
 class RunTable {
  public:
   explicit RunTable(std::size_t name_width) : width_(static_cast<int>(name_width)) {
-    fmt::print("{:<{}}{:>8}{:>10}{:>14}{:>12}{:>12}{:>12}\n", "run", width_ + 2, "poses", "coverage", "position [m]",
+    fmt::print("{:<{}}{:>8}{:>10}{:>14}{:>12}{:>12}{:>13}\n", "run", width_ + 2, "poses", "coverage", "position [m]",
                "rot. [deg]", "yaw [deg]", "grav. [deg]");
   }
 
@@ -121,7 +122,7 @@ class RunTable {
       fmt::print("  failed: {}\n", e.reason);
       return;
     }
-    fmt::print("{:>8}{:>8.1f} %{:>14.6f}{:>12.6f}{:>12.6f}{:>12.6f}\n", e.matched, 100.0 * e.coverage,
+    fmt::print("{:>8}{:>8.1f} %{:>14.6f}{:>12.6f}{:>12.6f}{:>13.6f}\n", e.matched, 100.0 * e.coverage,
                e.position_m.rmse, e.rotation_deg.rmse, e.yaw_deg.rmse, e.gravity_deg.rmse);
     position_m_.push_back(e.position_m.rmse);
     rotation_deg_.push_back(e.rotation_deg.rmse);

@@ -40,7 +40,8 @@ struct TrajectoryErrorOptions {
   double first_s = 0.0;  // or those up to so long after the first; 0: all. Not both.
   core::TimeNs tolerance_ns = kDefaultToleranceNs;
   double min_coverage = 0.9;
-  std::vector<Delta> deltas = {};  // of the relative errors
+  // Of the relative errors.
+  std::vector<Delta> deltas = {};  // NOLINT(readability-redundant-member-init): designated initialisers leave it out
 };
 
 struct TrajectoryErrors {
