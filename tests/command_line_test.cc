@@ -143,6 +143,19 @@ TEST_F(CommandLine, ReplayGivesTheStoredRow) {
   EXPECT_EQ(plumbline("replay out 0123456789abcdef").code, 2);
 }
 
+TEST_F(CommandLine, SimulatePlotsWhereItSays) {
+  write("scenario.yaml", "duration_s: 3\nworld: {type: rooms, landmarks: 1000}\npoints: {per_frame: 20}\n");
+  const Result result = plumbline("simulate scenario.yaml --out data --plot");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("plots: data/plots\n"));
+  for (const char* name : {"trajectory.png", "frame.png"}) {
+    EXPECT_TRUE(read(folder_ / "data/plots" / name).starts_with("\x89PNG")) << name;
+    EXPECT_GT(fs::file_size(folder_ / "data/plots" / name), 10000U) << name;
+  }
+  ASSERT_EQ(plumbline("simulate scenario.yaml --out plain").code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "plain/plots"));
+}
+
 // Simulated, written, read and estimated equals the run in memory; and the estimator never needs the truth.
 TEST_F(CommandLine, TheDatasetOnDiskEstimatesToTheSameBytesWithoutItsTruth) {
   write("scenario.yaml",

@@ -3,6 +3,7 @@
 
 #include "core/error.h"
 #include "core/pose_file.h"
+#include "core/pose_formats.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
   using namespace plumbline;
@@ -10,6 +11,13 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
   for (const bool allow_unusable : {false, true}) {
     try {
       core::parse_tum(text, "fuzz.tum", {.allow_unusable = allow_unusable});
+    } catch (const core::InputError&) {
+    }
+  }
+  using core::PoseFormat;
+  for (const PoseFormat format : {PoseFormat::kAuto, PoseFormat::kEuroc, PoseFormat::kKitti}) {
+    try {
+      core::parse_poses(text, "fuzz.txt", {.format = format, .kitti_rate_hz = 10.0});
     } catch (const core::InputError&) {
     }
   }

@@ -18,6 +18,7 @@
 #include "sim/trajectory.h"
 #include "sim/truth_files.h"
 #include "tools/experiment.h"
+#include "tools/plot.h"
 #include "tools/run_trial.h"
 #include "tools/version.h"
 
@@ -98,6 +99,15 @@ int simulate(const SimulateOptions& options) {
              simulation.measurements.imu.size(), frames, observations,
              frames > 0 ? static_cast<double>(observations) / static_cast<double>(frames) : 0.0,
              simulation.truth.track_landmark.size(), options.out.generic_string());
+  if (options.plot) {
+    const std::filesystem::path plots = options.out / "plots";
+    write_plots(plots, {.scenario = scenario,
+                        .trajectory = *trajectory,
+                        .world = sim::make_world(scenario, *trajectory, id),
+                        .simulation = simulation,
+                        .title = options.scenario.stem().string()});
+    fmt::print("plots: {}\n", plots.generic_string());
+  }
   return kExitOk;
 }
 

@@ -53,6 +53,8 @@ int parse_and_run(int argc, char** argv) {
   simulate_command->add_option("--out", simulate_options.out, "folder of the dataset")->required();
   simulate_command->add_option("--seed", simulate_options.seed, "seed of all draws");
   simulate_command->add_option("--trial", simulate_options.trial, "which draw of noise and priors");
+  simulate_command->add_flag("--plot", simulate_options.plot,
+                             "draw path, world and a frame into plots/ of the dataset");
   add_set(simulate_command, simulate_options.set);
 
   EstimateOptions estimate_options;

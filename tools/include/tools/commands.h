@@ -36,6 +36,7 @@ struct SimulateOptions {
   std::uint64_t seed = 1;
   std::uint64_t trial = 0;
   std::vector<std::string> set;
+  bool plot = false;  // pictures into plots/ of the dataset
 };
 int simulate(const SimulateOptions& options);
 
