@@ -22,7 +22,7 @@ void evaluate_with_jacobians(benchmark::State& state, const ceres::CostFunction&
 }
 
 void add(const FactorSubject& subject) {
-  const auto scene = std::make_shared<FactorScene>(subject.scene({.scene = 1, .noise = 1.0}));
+  const auto scene = std::make_shared<FactorScene>(subject.scene({.scene = 1, .noise = 1.0, .off_truth = true}));
   benchmark::RegisterBenchmark((subject.name + "/analytic").c_str(), [scene](benchmark::State& state) {
     evaluate_with_jacobians(state, *scene->factor, scene->blocks);
   });

@@ -138,7 +138,7 @@ TEST(FeatureVelocity, ItsErrorIsQuadraticInTheShift) {
     // The state lies shift_s before the exposure.
     testing::TwoViews moved = s;
     const double exposure_s = s.observer.t_cam_s + s.rig.td_s;
-    moved.observer.state_index = static_cast<std::size_t>(std::llround((exposure_s - shift_s) * 4000.0));
+    moved.observer.state_index = static_cast<std::size_t>(std::llround((exposure_s - shift_s) * testing::kFineHz));
     moved.observer.offset_s = s.observer.t_cam_s - core::to_seconds((*s.samples)[moved.observer.state_index].t_ns);
     sim::TrajectoryConfig c;
     c.handheld.rate_rms_rad_s = 0.75;
