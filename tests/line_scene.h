@@ -91,7 +91,7 @@ inline LineView line_view(const sim::Trajectory& trajectory, const core::RigCali
   s.samples = std::make_shared<const std::vector<core::ImuSample>>(std::move(samples));
 
   const core::Pose T_W_C = at_state.T_W_B * rig.T_B_C;
-  const sim::FrameView frame(trajectory, s.camera, s.rig, t_cam_s);
+  const sim::FrameView frame(trajectory, s.camera, s.rig, sim::half_angle_of_view_rad(s.camera), t_cam_s);
   for (std::uint64_t k = 0; k < 1000; ++k) {
     std::array<Eigen::Vector3d, 2> ends;
     bool seen = true;

@@ -87,7 +87,7 @@ inline TwoViews two_views(const sim::Trajectory& trajectory, const core::RigCali
     return {.T_W_B = x.T_W_B, .v_W = x.v_W, .bias = bias};
   };
   const auto view = [&](double t_cam_s, const Eigen::Vector3d& P_W) -> std::optional<SceneView> {
-    const sim::FrameView frame(trajectory, s.camera, rig, t_cam_s);
+    const sim::FrameView frame(trajectory, s.camera, rig, sim::half_angle_of_view_rad(s.camera), t_cam_s);
     const auto exposure = frame.expose(P_W);
     if (!exposure || !s.camera.contains(exposure->pixel)) return std::nullopt;
     SceneView v{.t_cam_s = t_cam_s};

@@ -51,7 +51,7 @@ struct MetricInfo {
   bool in_table = true;     // false: the value repeats another metric's, only the NEES is new
 };
 
-inline constexpr std::array<MetricInfo, 19> kMetrics = {{
+inline constexpr std::array<MetricInfo, 18> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
@@ -70,7 +70,6 @@ inline constexpr std::array<MetricInfo, 19> kMetrics = {{
     {"joint", "calibration and state", 1e3, false, false},
     {"nis_visual", "visual residuals, squared", 1.0, false, false},
     {"nis_inertial", "inertial residuals, squared", 1.0, false, false},
-    {"kappa2", "noise within the gaps", 1.0, false, false},
 }};
 
 inline constexpr std::string_view kTdConvergence = "td_convergence_s";
