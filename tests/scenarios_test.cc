@@ -122,9 +122,11 @@ TEST_P(Scenario, ObservationsAreOfTheTruthAndPlenty) {
   ASSERT_GT(frames.size(), 50U);
 
   const core::RigCalibration calibration = config_.calibration();
+  const double half_angle_rad = sim::half_angle_of_view_rad(config_.camera.model);
   std::vector<double> errors2;  // in sigmas
   for (std::size_t k = 0; k < frames.size(); k += 5) {
-    const sim::FrameView view(*trajectory_, config_.camera.model, calibration, core::to_seconds(frames[k].t_cam_ns));
+    const sim::FrameView view(*trajectory_, config_.camera.model, calibration, half_angle_rad,
+                              core::to_seconds(frames[k].t_cam_ns));
     EXPECT_GE(frames[k].points.size(), 20U) << k;
     for (const auto& point : frames[k].points) {
       const int landmark = simulation.truth.track_landmark.at(point.track_id);
@@ -135,10 +137,16 @@ TEST_P(Scenario, ObservationsAreOfTheTruthAndPlenty) {
   }
   EXPECT_GT(static_cast<double>(errors2.size()),
             0.8 * config_.points.per_frame * std::ceil(static_cast<double>(frames.size()) / 5.0));
-  // The median of chi-square with 2 degrees of freedom is 2 ln 2; 2000 or more observations hold it to 3 %, and a few
-  // per cent of outliers move it by as much.
   std::nth_element(errors2.begin(), errors2.begin() + static_cast<std::ptrdiff_t>(errors2.size() / 2), errors2.end());
-  EXPECT_NEAR(errors2[errors2.size() / 2], 2.0 * std::log(2.0), 0.2 * 2.0 * std::log(2.0));
+  const double median2 = errors2[errors2.size() / 2];
+  // The median of chi-square with 2 degrees of freedom is 2 ln 2; 2000 or more observations hold it to 3 %, and a few
+  // per cent of outliers move it by as much. Heavy tails and stamps that jitter have no such figure, but stay near.
+  const bool gaussian = !config_.camera.pixel_noise_dof && config_.camera.stamp_jitter_s == 0.0;
+  if (gaussian) {
+    EXPECT_NEAR(median2, 2.0 * std::log(2.0), 0.2 * 2.0 * std::log(2.0));
+  } else {
+    EXPECT_LT(median2, 9.0);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, Scenario, testing::ValuesIn(scenario_files()),

@@ -89,12 +89,19 @@ World frustum_world(const ScenarioConfig& scenario, const Trajectory& trajectory
   const auto& camera = scenario.camera.model;
   World world;
   world.points_W.reserve(static_cast<std::size_t>(config.landmarks));
+  // Pixels beyond the fold of the lens have no ray and are drawn again.
+  constexpr std::uint64_t kMostDraws = 10000;
   for (int i = 0; i < config.landmarks; ++i) {
-    const auto u = stream.uniforms(static_cast<std::uint64_t>(i));
-    const core::Pose T_W_C = trajectory.pose_at(u[0] * scenario.duration_s) * calibration.T_B_C;
-    const Eigen::Vector3d ray = camera.unproject({u[1] * camera.width_px - 0.5, u[2] * camera.height_px - 0.5});
-    const double depth = config.nearest_m + u[3] * (config.farthest_m - config.nearest_m);
-    world.points_W.emplace_back(T_W_C * Eigen::Vector3d(depth / ray.z() * ray));
+    for (std::uint64_t draw = 0;; ++draw) {
+      if (draw == kMostDraws) throw std::logic_error("frustum_world: hardly any pixel has a ray");
+      const auto u = stream.uniforms(static_cast<std::uint64_t>(i), draw);
+      const auto ray = camera.try_unproject({u[1] * camera.width_px - 0.5, u[2] * camera.height_px - 0.5});
+      if (!ray) continue;
+      const core::Pose T_W_C = trajectory.pose_at(u[0] * scenario.duration_s) * calibration.T_B_C;
+      const double depth = config.nearest_m + u[3] * (config.farthest_m - config.nearest_m);
+      world.points_W.emplace_back(T_W_C * Eigen::Vector3d(depth / ray->z() * *ray));
+      break;
+    }
   }
   return world;
 }
