@@ -344,7 +344,7 @@ TEST(TrajectoryConfigRules, NameTheirKey) {
   TrajectoryConfig kitti;
   kitti.type = TrajectoryType::kSpline;
   EXPECT_EQ(key(kitti), "file");
-  kitti.file = "poses.txt";
+  kitti.file = PLUMBLINE_SOURCE_DIR "/README.md";  // which is there
   EXPECT_EQ(key(kitti), "");
   kitti.format = core::PoseFormat::kKitti;
   EXPECT_EQ(key(kitti), "pose_rate_hz");
