@@ -15,7 +15,7 @@ void evaluate_with_jacobians(benchmark::State& state, const ceres::CostFunction&
   std::vector<double*> jacobians;
   for (std::vector<double>& v : values) jacobians.push_back(v.data());
   const std::vector<const double*> parameters = pointers(blocks);
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     if (!factor.Evaluate(parameters.data(), residual.data(), jacobians.data())) state.SkipWithError("no value");
     benchmark::DoNotOptimize(values);
   }

@@ -24,7 +24,7 @@ void evaluate(benchmark::State& state, const ceres::CostFunction& factor, std::v
     jacobians.push_back(storage.back().data());
   }
   Eigen::Vector2d residual;
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     if (!factor.Evaluate(parameters.data(), residual.data(), jacobians.data())) state.SkipWithError("no value");
     benchmark::DoNotOptimize(residual);
     benchmark::ClobberMemory();

@@ -1,5 +1,8 @@
 #include "core/dataset.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -148,8 +151,30 @@ Config read_yaml(const std::filesystem::path& file) {
   return config;
 }
 
+// Differences of stamps must not overflow.
+constexpr TimeNs kLargestStampNs = 4'000'000'000'000'000'000;  // 126 years
+
 void check_increasing(const CsvReader& csv, TimeNs previous, TimeNs now, bool first) {
+  if (now < -kLargestStampNs || now > kLargestStampNs) csv.fail(fmt::format("stamp {} is beyond 126 years", now));
   if (!first && now <= previous) csv.fail(fmt::format("stamp {} does not come after {}", now, previous));
+}
+
+// What joins the prior with itself and with the IMU.
+void check_prior(const InitialPrior& prior, const std::vector<ImuSample>& imu, const std::string& file) {
+  const auto require_unit = [&](const Pose& pose, std::string_view key) {
+    if (std::abs(pose.q.norm() - 1.0) > 1e-3) {
+      throw DataError(fmt::format("{}: {}.quaternion_xyzw: must be a unit quaternion", file, key));
+    }
+  };
+  require_unit(prior.mean.T_W_B, "mean.T_W_B");
+  require_unit(prior.start.T_W_B, "start.T_W_B");
+  require_unit(prior.calibration.T_B_C, "calibration.T_B_C");
+  require_unit(prior.start_calibration.T_B_C, "start_calibration.T_B_C");
+  const auto sample = std::lower_bound(imu.begin(), imu.end(), prior.t_ns,
+                                       [](const ImuSample& s, TimeNs t_ns) { return s.t_ns < t_ns; });
+  if (sample == imu.end() || sample->t_ns != prior.t_ns) {
+    throw DataError(fmt::format("{}: t_ns: {} is not the stamp of an IMU sample", file, prior.t_ns));
+  }
 }
 
 }  // namespace
@@ -225,6 +250,7 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
         {t_ns, {imu.number(1), imu.number(2), imu.number(3)}, {imu.number(4), imu.number(5), imu.number(6)}});
   }
   if (log.imu.size() < 2) imu.fail("an IMU needs two samples");
+  check_prior(log.prior, log.imu, (folder / "prior.yaml").generic_string());
   CsvReader frames(folder / kFramesFile, 1);
   while (frames.next()) {
     const TimeNs t_ns = frames.integer(0);

@@ -21,5 +21,12 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
     } catch (const core::InputError&) {
     }
   }
+  for (const auto format :
+       {core::PoseFormat::kAuto, core::PoseFormat::kTum, core::PoseFormat::kEuroc, core::PoseFormat::kKitti}) {
+    try {
+      core::parse_poses(text, "fuzz.txt", {.format = format, .kitti_rate_hz = 10.0});
+    } catch (const core::InputError&) {
+    }
+  }
   return 0;
 }

@@ -22,7 +22,7 @@ sim::ScenarioConfig handheld_rs() {
 void simulate(benchmark::State& state) {
   const sim::ScenarioConfig config = handheld_rs();
   std::uint64_t trial = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(sim::simulate(config, {1, trial++}));
+  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(sim::simulate(config, {1, trial++}));
   state.counters["times_real_time"] =
       benchmark::Counter(config.duration_s * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
@@ -61,7 +61,7 @@ void simulate_with_all_defects(benchmark::State& state) {
   std::uint64_t trial = 0;
   std::size_t points = 0;
   std::size_t frames = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     const sim::Simulation s = sim::simulate(config, {1, trial++});
     for (const core::Frame& frame : s.measurements.frames) points += frame.points.size();
     frames += s.measurements.frames.size();
@@ -75,7 +75,7 @@ BENCHMARK(simulate_with_all_defects)->Unit(benchmark::kMillisecond);
 void batch_solve(benchmark::State& state) {
   const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
   int observations = 0;
-  for (auto _ : state) observations = estimator::estimate(s.measurements, {}).summary.observations;
+  for ([[maybe_unused]] auto _ : state) observations = estimator::estimate(s.measurements, {}).summary.observations;
   state.counters["observations"] = observations;
 }
 BENCHMARK(batch_solve)->Unit(benchmark::kSecond)->Iterations(3);
@@ -83,7 +83,7 @@ BENCHMARK(batch_solve)->Unit(benchmark::kSecond)->Iterations(3);
 void preintegrate_20_samples(benchmark::State& state) {
   const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
   const std::span<const core::ImuSample> samples(s.measurements.imu.data(), 21);
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     benchmark::DoNotOptimize(estimator::preintegrate(samples, {}, s.measurements.imu_noise));
   }
 }

@@ -38,6 +38,7 @@ void write_simulation(const std::filesystem::path& folder, const sim::Simulation
 void write_estimate(const std::filesystem::path& folder, const core::EstimateLog& estimate) {
   std::filesystem::create_directories(folder);
   std::vector<core::StampedPose> poses;
+  poses.reserve(estimate.states.size());
   for (const core::StampedState& s : estimate.states) poses.push_back({s.t_ns, s.state.T_W_B});
   core::write_tum(folder / "estimate.tum", poses);
   const auto sigma = [&](int i) { return std::sqrt(estimate.covariance(i, i)); };

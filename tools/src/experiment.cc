@@ -184,7 +184,7 @@ void check_cell(const Experiment& e) {
   sim::make_world(e.scenario, *trajectory, id);
 }
 
-Plan make_plan(ConfigTree root, const std::vector<Axis>& axes, const std::string& default_name) {
+Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std::string& default_name) {
   Plan plan;
   plan.base = read_experiment(root);
   std::string& name = plan.base.experiment.name;
@@ -243,7 +243,7 @@ Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>
   require_map(root, "");
   std::vector<Axis> axes;
   root = apply_overrides(std::move(root), overrides, &axes);
-  Plan plan = make_plan(std::move(root), axes, file.stem().string());
+  Plan plan = make_plan(root, axes, file.stem().string());
   for (const Cell& cell : plan.cells) check_cell(cell.experiment);
   return plan;
 }
