@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <regex>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,9 +21,13 @@ TEST(Streams, TheListIsComplete) {
   for (const auto& entry : std::filesystem::directory_iterator(PLUMBLINE_SOURCE_DIR "/sim/src")) {
     std::ifstream in(entry.path());
     const std::string text{std::istreambuf_iterator<char>(in), {}};
-    const std::regex purpose("\"([a-z0-9_]+/[a-z0-9_]+)\"");
-    for (auto it = std::sregex_iterator(text.begin(), text.end(), purpose); it != std::sregex_iterator(); ++it) {
-      used.insert((*it)[1]);
+    for (std::size_t open = text.find('"'); open != std::string::npos; open = text.find('"', open + 1)) {
+      const std::string word = text.substr(open + 1, text.find('"', open + 1) - open - 1);
+      const bool plain = word.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_/") == std::string::npos;
+      const std::size_t slash = word.find('/');
+      if (plain && slash != std::string::npos && slash > 0 && slash + 1 < word.size() && slash == word.rfind('/')) {
+        used.insert(word);
+      }
     }
   }
   EXPECT_EQ(used, std::set<std::string>(kStreams.begin(), kStreams.end()));

@@ -85,8 +85,9 @@ std::optional<BoundSummary> summarise_bound(const std::vector<const Row*>& rows,
                                             const MetricSummary& metric, bool may_claim) {
   std::vector<double> bounds;
   for (const Row* row : rows) {
-    if (!row->metrics[i].crlb) return std::nullopt;
-    bounds.push_back(*row->metrics[i].crlb);
+    const std::optional<double>& crlb = row->metrics[i].crlb;
+    if (!crlb) return std::nullopt;
+    bounds.push_back(*crlb);
   }
   BoundSummary summary{.crlb = root_mean_square(bounds), .efficiency = {}, .efficiency_ci95 = {}};
   if (!may_claim) return summary;

@@ -11,16 +11,16 @@
 namespace plumbline::sim {
 namespace {
 
-struct Entry {
+struct WorldMaker {
   WorldType type;
   World (*make)(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
 };
 
-constexpr std::array<Entry, kWorldTypeNames.size()> kRegistry = {{{WorldType::kShell, shell_world},
-                                                                  {WorldType::kFrustum, frustum_world},
-                                                                  {WorldType::kPlanes, planes_world},
-                                                                  {WorldType::kRooms, rooms_world},
-                                                                  {WorldType::kCorridor, corridor_world}}};
+constexpr std::array<WorldMaker, kWorldTypeNames.size()> kWorldMakers = {{{WorldType::kShell, shell_world},
+                                                                          {WorldType::kFrustum, frustum_world},
+                                                                          {WorldType::kPlanes, planes_world},
+                                                                          {WorldType::kRooms, rooms_world},
+                                                                          {WorldType::kCorridor, corridor_world}}};
 
 void refuse_path_through_walls(const Walls& walls, const std::vector<Eigen::Vector3d>& path_W) {
   for (std::size_t i = 1; i < path_W.size(); ++i) {
@@ -52,9 +52,9 @@ Path sample_path(const ScenarioConfig& scenario, const Trajectory& trajectory) {
 }
 
 World make_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id) {
-  const auto entry =
-      std::find_if(kRegistry.begin(), kRegistry.end(), [&](const Entry& e) { return e.type == scenario.world.type; });
-  if (entry == kRegistry.end()) throw std::logic_error("make_world: unknown type");
+  const auto entry = std::find_if(kWorldMakers.begin(), kWorldMakers.end(),
+                                  [&](const WorldMaker& e) { return e.type == scenario.world.type; });
+  if (entry == kWorldMakers.end()) throw std::logic_error("make_world: unknown type");
   World world = entry->make(scenario, trajectory, id);
   if (!world.walls.walls.empty()) {
     const Path path = sample_path(scenario, trajectory);

@@ -19,7 +19,7 @@ class LineRows {
   bool any() const { return jacobians_ != nullptr; }
   double* row(int block, int size, int k) const {
     double* J = any() ? jacobians_[block] : nullptr;
-    return J != nullptr ? J + k * size : nullptr;
+    return J != nullptr ? J + static_cast<std::ptrdiff_t>(k) * size : nullptr;
   }
 
  private:

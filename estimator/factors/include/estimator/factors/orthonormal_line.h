@@ -37,7 +37,10 @@ struct OrthonormalLine {
       : q(Eigen::Map<const Eigen::Quaterniond>(block)), U(q.toRotationMatrix()), w1(block[4]), w2(block[5]) {}
 
   PluckerLine plucker() const { return {w1 * U.col(0), w2 * U.col(1)}; }
-  bool degenerate() const { return !(std::abs(w1) > kDegenerateLine && std::abs(w2) > kDegenerateLine); }
+  bool degenerate() const {
+    const bool regular = std::abs(w1) > kDegenerateLine && std::abs(w2) > kDegenerateLine;  // NaN is not
+    return !regular;
+  }
 
   // A row of derivatives with respect to (n, d), on the tangent (psi, phi).
   Eigen::RowVector4d to_tangent(const Eigen::Vector3d& dr_dn, const Eigen::Vector3d& dr_dd) const {
