@@ -223,7 +223,10 @@ class Builder {
   Layout layout() const {
     Layout l{.rows = free_, .units = Eigen::VectorXd(static_cast<Eigen::Index>(free_.size()) + kStateDof)};
     for (int i = 0; i < kStateDof; ++i) l.rows.push_back(core::kCovLastState + i);
-    l.units << calibration_units()(free_), state_units();
+    for (std::size_t i = 0; i < free_.size(); ++i) {
+      l.units[static_cast<Eigen::Index>(i)] = calibration_units()[free_[i]];
+    }
+    l.units.tail<kStateDof>() = state_units();
     return l;
   }
   std::vector<Variable> calibration_and(Variable state) const {

@@ -13,6 +13,27 @@ Eigen::LLT<Eigen::MatrixXd> factorised(const Eigen::MatrixXd& H) {
   return llt;
 }
 
+// Plain loops, since Eigen's own selection and triangular solvers touch the first element of an empty matrix.
+Eigen::MatrixXd select(const Eigen::MatrixXd& M, const std::vector<int>& rows, const std::vector<int>& columns) {
+  Eigen::MatrixXd selected(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      selected(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = M(rows[r], columns[c]);
+    }
+  }
+  return selected;
+}
+
+Eigen::MatrixXd select_rows(const Eigen::MatrixXd& M, const std::vector<int>& rows) {
+  Eigen::MatrixXd selected(static_cast<Eigen::Index>(rows.size()), M.cols());
+  for (std::size_t r = 0; r < rows.size(); ++r) selected.row(static_cast<Eigen::Index>(r)) = M.row(rows[r]);
+  return selected;
+}
+
+void assign_rows(const Eigen::MatrixXd& values, const std::vector<int>& rows, Eigen::MatrixXd& M) {
+  for (std::size_t r = 0; r < rows.size(); ++r) M.row(rows[r]) = values.row(static_cast<Eigen::Index>(r));
+}
+
 }  // namespace
 
 InformationChain::Variable InformationChain::add(int dof) {
@@ -76,14 +97,18 @@ void InformationChain::eliminate(const std::vector<Variable>& variables) {
     if (std::find(variables.begin(), variables.end(), v) == variables.end()) conditional.separator.push_back(v);
   }
   const std::vector<int> S = columns_of(conditional.separator);
-  conditional.H_FF = factorised(H_(F, F));
-  const Eigen::MatrixXd H_FS = H_(F, S);
-  conditional.A = conditional.H_FF.solve(H_FS);
-  // H_SF H_FF^-1 H_FS as a square, so that rounding leaves it symmetric.
-  const Eigen::MatrixXd root = conditional.H_FF.matrixL().solve(H_FS);
-  Eigen::MatrixXd reduced = H_(S, S);
-  reduced.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose(), -1.0);
-  reduced.triangularView<Eigen::StrictlyUpper>() = reduced.transpose();
+  conditional.H_FF = factorised(select(H_, F, F));
+  const Eigen::MatrixXd H_FS = select(H_, F, S);
+  Eigen::MatrixXd reduced = select(H_, S, S);
+  if (S.empty()) {
+    conditional.A = H_FS;
+  } else {
+    conditional.A = conditional.H_FF.solve(H_FS);
+    // H_SF H_FF^-1 H_FS as a square, so that rounding leaves it symmetric.
+    const Eigen::MatrixXd root = conditional.H_FF.matrixL().solve(H_FS);
+    reduced.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose(), -1.0);
+    reduced.triangularView<Eigen::StrictlyUpper>() = reduced.transpose();
+  }
   H_ = std::move(reduced);
   active_ = conditional.separator;
   reindex();
@@ -118,16 +143,19 @@ std::vector<Eigen::MatrixXd> InformationChain::marginals() const {
     for (const Variable v : c->separator) {
       for (int i = 0; i < dof(v); ++i) S.push_back(place.at(v) + i);
     }
-    const Eigen::MatrixXd Sigma_SS = Sigma(S, S);
+    const Eigen::MatrixXd Sigma_SS = select(Sigma, S, S);
     const auto f = c->A.rows();
     const auto s = c->A.cols();
     Eigen::MatrixXd next(f + s, f + s);
-    const Eigen::MatrixXd ASigma = c->A * Sigma_SS;
     const Eigen::MatrixXd own = c->H_FF.matrixL().solve(Eigen::MatrixXd::Identity(f, f));
-    next.topLeftCorner(f, f) = own.transpose() * own + ASigma * c->A.transpose();
-    next.topRightCorner(f, s) = -ASigma;
-    next.bottomLeftCorner(s, f) = -ASigma.transpose();
-    next.bottomRightCorner(s, s) = Sigma_SS;
+    next.topLeftCorner(f, f) = own.transpose() * own;
+    if (s > 0) {
+      const Eigen::MatrixXd ASigma = c->A * Sigma_SS;
+      next.topLeftCorner(f, f) += ASigma * c->A.transpose();
+      next.topRightCorner(f, s) = -ASigma;
+      next.bottomLeftCorner(s, f) = -ASigma.transpose();
+      next.bottomRightCorner(s, s) = Sigma_SS;
+    }
     Sigma = std::move(next);
 
     place.clear();
@@ -149,13 +177,15 @@ Eigen::MatrixXd InformationChain::solve(const Eigen::MatrixXd& B) const {
   if (!active_.empty()) throw std::logic_error("InformationChain: finish() first");
   Eigen::MatrixXd x = B;
   for (const Conditional& c : conditionals_) {
-    const Eigen::MatrixXd b_F = x(rows_of(c.frontal), Eigen::all);
-    x(rows_of(c.separator), Eigen::all) -= c.A.transpose() * b_F;
+    if (c.separator.empty()) continue;
+    const std::vector<int> S = rows_of(c.separator);
+    assign_rows(select_rows(x, S) - c.A.transpose() * select_rows(x, rows_of(c.frontal)), S, x);
   }
   for (auto c = conditionals_.rbegin(); c != conditionals_.rend(); ++c) {
-    const Eigen::MatrixXd b_F = x(rows_of(c->frontal), Eigen::all);
-    const Eigen::MatrixXd x_S = x(rows_of(c->separator), Eigen::all);
-    x(rows_of(c->frontal), Eigen::all) = c->H_FF.solve(b_F) - c->A * x_S;
+    const std::vector<int> F = rows_of(c->frontal);
+    Eigen::MatrixXd x_F = c->H_FF.solve(select_rows(x, F));
+    if (!c->separator.empty()) x_F -= c->A * select_rows(x, rows_of(c->separator));
+    assign_rows(x_F, F, x);
   }
   return x;
 }
