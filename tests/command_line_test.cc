@@ -379,7 +379,8 @@ TEST_F(CommandLine, EvaluateAFolderOfRuns) {
   write("truths/c.tum", curve(100, 1.5));
   const Result matched = plumbline("evaluate runs --truth truths --align none --json");
   EXPECT_EQ(matched.code, 0) << matched.err;
-  for (const auto& run : nlohmann::json::parse(matched.out)["runs"]) EXPECT_LT(run["ate_position_m"]["max"], 1e-12);
+  const nlohmann::json scores = nlohmann::json::parse(matched.out);
+  for (const auto& run : scores["runs"]) EXPECT_LT(run["ate_position_m"]["max"], 1e-12);
   fs::create_directory(folder_ / "empty");
   EXPECT_EQ(plumbline("evaluate empty --truth truth.tum").code, 2);
 }
