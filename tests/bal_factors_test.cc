@@ -97,10 +97,10 @@ std::vector<FactorScene> limits(Form form) {
 
 std::vector<FactorSubject> subjects() {
   std::vector<FactorSubject> list;
-  for (const auto& [name, form] : {std::pair{"Additive", Form::kAdditive}, std::pair{"Left", Form::kLeft}}) {
-    list.push_back({.name = name,
-                    .scene = [form = form](const SceneRequest& r) { return random_scene(form, r); },
-                    .limits = [form = form] { return limits(form); }});
+  for (const Form form : {Form::kAdditive, Form::kLeft}) {
+    list.push_back({.name = form == Form::kAdditive ? "Additive" : "Left",
+                    .scene = [form](const SceneRequest& r) { return random_scene(form, r); },
+                    .limits = [form] { return limits(form); }});
   }
   return list;
 }

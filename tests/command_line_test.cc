@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -16,40 +15,19 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include "program_test.h"
+
 namespace plumbline {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using Result = ProgramResult;
 
-std::string read(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path, std::ios::binary).rdbuf();
-  return text.str();
-}
-
-// The names of the files below a folder, sorted.
-std::vector<std::string> listing(const fs::path& folder) {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    names.push_back(fs::relative(entry.path(), folder).generic_string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-struct Result {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-class CommandLine : public ::testing::Test {
+class CommandLine : public ProgramTest {
  protected:
   void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "plumbline-XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
+    ProgramTest::SetUp();
     // A second of simulated work that takes a tenth of one.
     write("small.yaml", R"(experiment: {trials: 3, seed: 5, axes: {scenario.camera.td_s: [0, 0.02]}}
 scenario:
@@ -61,21 +39,6 @@ scenario:
   points: {per_frame: 20}
 )");
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  fs::path write(const std::string& name, const std::string& text) {
-    std::ofstream(folder_ / name) << text;
-    return folder_ / name;
-  }
-
-  Result plumbline(const std::string& arguments) {
-    const std::string command = "cd '" + folder_.string() + "' && '" PLUMBLINE_PROGRAM "' " + arguments +
-                                " >stdout.txt 2>stderr.txt </dev/null";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, read(folder_ / "stdout.txt"), read(folder_ / "stderr.txt")};
-  }
-
-  fs::path folder_;
 };
 
 TEST_F(CommandLine, VersionHelpAndNoCommand) {
@@ -85,6 +48,24 @@ TEST_F(CommandLine, VersionHelpAndNoCommand) {
   EXPECT_EQ(plumbline("--help").code, 0);
   EXPECT_EQ(plumbline("").code, 2);
   EXPECT_EQ(plumbline("fly").code, 2);
+}
+
+// The executable passes on what the function prints and returns.
+TEST_F(CommandLine, TheExecutable) {
+  const auto execute = [&](const std::string& arguments) {
+    const std::string command = "cd '" + folder_.string() + "' && '" PLUMBLINE_PROGRAM "' " + arguments +
+                                " >stdout.txt 2>stderr.txt </dev/null";
+    const int status = std::system(command.c_str());
+    return Result{WIFEXITED(status) ? WEXITSTATUS(status) : 128, read(folder_ / "stdout.txt"),
+                  read(folder_ / "stderr.txt")};
+  };
+  for (const char* arguments : {"--version", "check small.yaml", "check small.yaml --set scenario.camera.rate_hz=0"}) {
+    const Result expected = plumbline(arguments);
+    const Result result = execute(arguments);
+    EXPECT_EQ(result.code, expected.code) << arguments;
+    EXPECT_EQ(result.out, expected.out) << arguments;
+    EXPECT_EQ(result.err, expected.err) << arguments;
+  }
 }
 
 TEST_F(CommandLine, RunWritesTheSameBytesForAnyNumberOfThreads) {
@@ -318,6 +299,36 @@ TEST_F(CommandLine, EvaluateGivesTheStatedKeys) {
   EXPECT_EQ(plumbline("evaluate estimate.tum --truth truth.tum").code, 0);
   EXPECT_EQ(plumbline("evaluate estimate.tum --truth truth.tum --rpe 3x").code, 2);
   EXPECT_EQ(plumbline("evaluate estimate.tum --truth truth.tum --first 9 --first-s 2").code, 2);
+}
+
+// t_ns, position, quaternion with w first, and EuRoC's further columns, which are not read.
+TEST_F(CommandLine, EvaluateReadsEurocFiles) {
+  const auto euroc = [](double dx_m, const std::string& quaternion) {
+    std::ostringstream text;
+    text << std::setprecision(12) << "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], ...\n";
+    for (int i = 0; i < 100; ++i) {
+      const double t = 0.1 * i;
+      text << i * 100'000'000LL << ',' << std::cos(t) + dx_m << ',' << std::sin(t) << ',' << 0.1 * t << ','
+           << quaternion << ",0,0,0\n";
+    }
+    return text.str();
+  };
+  write("truth.csv", euroc(0.0, "1,0,0,0"));
+  write("estimate.csv", euroc(0.25, "1,0,0,0"));
+  write("estimate.tum", curve(100, 0.25));
+  for (const char* name : {"estimate.csv", "estimate.tum"}) {
+    const Result result = plumbline(std::string("evaluate ") + name + " --truth truth.csv --align none --json");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto json = nlohmann::json::parse(result.out);
+    EXPECT_EQ(json["matched"], 100);
+    EXPECT_NEAR(json["ate_position_m"]["rmse"].get<double>(), 0.25, 1e-9);
+    EXPECT_LT(json["ate_rotation_deg"]["max"], 1e-9);
+  }
+  write("estimate.csv", euroc(0.25, "nan,0,0,0"));
+  const Result unusable = plumbline("evaluate estimate.csv --truth truth.csv --json");
+  EXPECT_EQ(unusable.code, 1);
+  EXPECT_EQ(nlohmann::json::parse(unusable.out)["ok"], false);
+  EXPECT_EQ(plumbline("evaluate estimate.tum --truth estimate.csv").code, 2);  // a truth must be sound
 }
 
 // Stamps of the camera's clock are late by td = -30 ms there; t_imu = t_cam + td brings them back.

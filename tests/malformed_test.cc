@@ -1,14 +1,14 @@
 // Input that breaks a rule: exit code 2, one line on stderr that names file, line and key, and nothing written.
-#include <cstdlib>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
+
+#include "program_test.h"
 
 namespace plumbline {
 namespace {
@@ -16,13 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-std::string read(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path, std::ios::binary).rdbuf();
-  return text.str();
-}
-
-void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+void save(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
 std::string repeat(const std::string& text, int times) {
   std::string result;
@@ -31,7 +25,7 @@ std::string repeat(const std::string& text, int times) {
 }
 
 // Every file below the folder with its size.
-std::vector<std::string> listing(const fs::path& folder) {
+std::vector<std::string> sizes(const fs::path& folder) {
   std::vector<std::string> names;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     names.push_back(entry.path().generic_string() +
@@ -51,25 +45,20 @@ struct Case {
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
-class Malformed : public ::testing::TestWithParam<Case> {
+class Malformed : public ProgramTest, public ::testing::WithParamInterface<Case> {
  protected:
   // A sound dataset, estimate and pose file that the cases spoil.
   static void SetUpTestSuite() {
-    std::string name = (fs::temp_directory_path() / "plumbline-malformed-XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    sound_ = new fs::path(name);
-    write(
-        *sound_ / "scenario.yaml",
-        "duration_s: 1\nimu: {rate_hz: 50, gyro_noise_density_rad_s_sqrt_hz: 1e-3, gyro_bias_walk_rad_s2_sqrt_hz: "
-        "1e-4, accel_noise_density_m_s2_sqrt_hz: 1e-2, accel_bias_walk_m_s3_sqrt_hz: 1e-3}\npoints: {per_frame: 5}\n");
+    sound_ = new fs::path(make_folder());
+    save(*sound_ / "scenario.yaml",
+         "duration_s: 1\nimu: {rate_hz: 50, gyro_noise_density_rad_s_sqrt_hz: 1e-3, gyro_bias_walk_rad_s2_sqrt_hz: "
+         "1e-4, accel_noise_density_m_s2_sqrt_hz: 1e-2, accel_bias_walk_m_s3_sqrt_hz: 1e-3}\npoints: {per_frame: 5}\n");
     std::string poses;
     for (int i = 0; i <= 100; ++i)
       poses += std::to_string(0.05 * i) + " " + std::to_string(0.01 * i) + " 0 0 0 0 0 1\n";
-    write(*sound_ / "poses.tum", poses);
-    write(*sound_ / "spline.yaml", "duration_s: 2\ntrajectory: {type: spline, file: poses.tum}\n");
-    const std::string simulate = std::string("cd '") + sound_->string() +
-                                 "' && '" PLUMBLINE_PROGRAM "' simulate scenario.yaml --out data >/dev/null";
-    ASSERT_EQ(std::system(simulate.c_str()), 0);
+    save(*sound_ / "poses.tum", poses);
+    save(*sound_ / "spline.yaml", "duration_s: 2\ntrajectory: {type: spline, file: poses.tum}\n");
+    ASSERT_EQ(plumbline_in(*sound_, "simulate scenario.yaml --out data").code, 0);
   }
   static void TearDownTestSuite() {
     fs::remove_all(*sound_);
@@ -77,36 +66,25 @@ class Malformed : public ::testing::TestWithParam<Case> {
   }
 
   void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "plumbline-malformed-XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
+    ProgramTest::SetUp();
     fs::copy(*sound_, folder_, fs::copy_options::recursive);
-    output_ = folder_.string() + ".output";
-  }
-  void TearDown() override {
-    fs::remove_all(folder_);
-    fs::remove(output_);
   }
 
   static fs::path* sound_;
-  fs::path folder_;
-  fs::path output_;
 };
 fs::path* Malformed::sound_ = nullptr;
 
 TEST_P(Malformed, OneLineCodeTwoNothingWritten) {
   const Case& c = GetParam();
-  if (!c.file.empty()) write(folder_ / c.file, c.text);
-  const std::vector<std::string> before = listing(folder_);
-  const std::string command = std::string("cd '") + folder_.string() + "' && '" PLUMBLINE_PROGRAM "' " + c.arguments +
-                              " >/dev/null 2>'" + output_.string() + "' </dev/null";
-  const int status = std::system(command.c_str());
-  const std::string message = read(output_);
-  EXPECT_EQ(WIFEXITED(status) ? WEXITSTATUS(status) : 128, 2) << message;
+  if (!c.file.empty()) write(c.file, c.text);
+  const std::vector<std::string> before = sizes(folder_);
+  const ProgramResult result = plumbline(c.arguments);
+  const std::string& message = result.err;
+  EXPECT_EQ(result.code, 2) << message;
   EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 1) << message;
   EXPECT_LT(message.size(), 1000U);
   for (const std::string& part : c.says) EXPECT_THAT(message, HasSubstr(part));
-  EXPECT_EQ(listing(folder_), before);
+  EXPECT_EQ(sizes(folder_), before);
 }
 
 // A scenario in x.yaml that is to be simulated.

@@ -1,6 +1,7 @@
 #include "core/config_tree.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -246,11 +247,14 @@ ConfigTree load_config_file(const std::filesystem::path& file) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw ConfigError(label + ": cannot be opened: " + std::strerror(errno));
-  // Read rather than trust a file's stated size, which pipes and devices do not have; one byte more shows the excess.
-  std::string text(kMaxConfigBytes + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  // Read rather than trust a file's stated size, which pipes and devices do not have; the parser refuses the excess.
+  std::string text;
+  std::array<char, 1 << 14> chunk;
+  while (stream && text.size() <= kMaxConfigBytes) {
+    stream.read(chunk.data(), chunk.size());
+    text.append(chunk.data(), static_cast<std::size_t>(stream.gcount()));
+  }
   if (stream.bad()) throw ConfigError(label + ": cannot be read");
-  text.resize(static_cast<std::size_t>(stream.gcount()));
   ConfigTree tree = parse_config(text, label);
   if (tree.kind == Kind::kNull) throw ConfigError(label + ": holds no keys");
   return tree;

@@ -40,7 +40,7 @@ std::vector<std::string_view> split_at_commas(std::string_view line) {
   return fields;
 }
 
-StampedPose parse_euroc(std::string_view line, const std::string& where) {
+StampedPose parse_euroc(std::string_view line, const std::string& where, bool allow_unusable) {
   constexpr std::size_t kColumns = 8;
   const std::vector<std::string_view> fields = split_at_commas(line);
   if (fields.size() < kColumns) {
@@ -52,7 +52,9 @@ StampedPose parse_euroc(std::string_view line, const std::string& where) {
   if (error != std::errc() || end != fields[0].data() + fields[0].size()) {
     throw DataError(fmt::format("{}: the stamp '{}' is not integer nanoseconds", where, fields[0]));
   }
-  const auto number = [&](std::size_t column) { return pose_text::parse_number(fields[column], where); };
+  const auto number = [&](std::size_t column) {
+    return pose_text::parse_number(fields[column], where, allow_unusable);
+  };
   return {t_ns,
           {pose_text::unit_quaternion({number(4), number(5), number(6), number(7)}, where),
            {number(1), number(2), number(3)}}};
@@ -88,20 +90,21 @@ Pose parse_kitti(std::string_view line, const std::string& where) {
 }
 
 std::vector<StampedPose> parse_rows(std::string_view text, const std::string& name, PoseFormat format,
-                                    double kitti_rate_hz) {
-  if (format == PoseFormat::kKitti && kitti_rate_hz <= 0.0) {
+                                    const PoseFormatOptions& options) {
+  if (format == PoseFormat::kKitti && options.kitti_rate_hz <= 0.0) {
     throw DataError(name + ": a KITTI file has no stamps; scenario.trajectory.pose_rate_hz must give their rate");
   }
   std::vector<StampedPose> poses;
   pose_text::Lines lines(text, name);
   while (const auto line = lines.next()) {
     if (format == PoseFormat::kEuroc) {
-      poses.push_back(parse_euroc(*line, lines.where()));
-      if (poses.size() > 1) {
+      poses.push_back(parse_euroc(*line, lines.where(), options.allow_unusable));
+      if (poses.size() > 1 && !options.allow_unusable) {
         pose_text::require_later(poses.back().t_ns, poses[poses.size() - 2].t_ns, lines.where());
       }
     } else {
-      poses.push_back({to_ns(static_cast<double>(poses.size()) / kitti_rate_hz), parse_kitti(*line, lines.where())});
+      poses.push_back(
+          {to_ns(static_cast<double>(poses.size()) / options.kitti_rate_hz), parse_kitti(*line, lines.where())});
     }
   }
   if (poses.empty()) throw DataError(name + ": no poses");
@@ -113,8 +116,8 @@ std::vector<StampedPose> parse_rows(std::string_view text, const std::string& na
 PoseFile parse_poses(std::string_view text, const std::string& name, const PoseFormatOptions& options) {
   pose_text::refuse_binary(text, name);
   const PoseFormat format = options.format == PoseFormat::kAuto ? format_of(text, name) : options.format;
-  if (format == PoseFormat::kTum) return {parse_tum(text, name), format};
-  return {parse_rows(text, name, format, options.kitti_rate_hz), format};
+  if (format == PoseFormat::kTum) return {parse_tum(text, name, {options.allow_unusable}), format};
+  return {parse_rows(text, name, format, options), format};
 }
 
 PoseFile read_poses(const std::filesystem::path& path, const PoseFormatOptions& options) {

@@ -9,6 +9,7 @@
 
 #include "core/config_tree.h"
 #include "core/error.h"
+#include "core/pose_formats.h"
 #include "sim/truth_files.h"
 
 namespace plumbline::tools {
@@ -63,14 +64,15 @@ EstimatedTrajectory read_estimate(const fs::path& path) {
   const bool folder = fs::is_directory(path);
   const fs::path file = folder ? path / kEstimateFile : path;
   EstimatedTrajectory estimate;
-  estimate.poses = core::read_tum(file, {.allow_unusable = true});
-  estimate.covariances = core::read_tum_covariances(file);
+  core::PoseFile poses = core::read_poses(file, {.allow_unusable = true});
+  estimate.poses = std::move(poses.poses);
+  if (poses.format == core::PoseFormat::kTum) estimate.covariances = core::read_tum_covariances(file);
   if (folder && fs::exists(path / "meta.yaml")) apply_clock(path / "meta.yaml", estimate);
   return estimate;
 }
 
 std::vector<core::StampedPose> read_true_poses(const fs::path& path) {
-  if (!fs::is_directory(path)) return core::read_tum(path);
+  if (!fs::is_directory(path)) return core::read_poses(path).poses;
   std::vector<core::StampedPose> poses;
   for (const core::StampedState& s : sim::read_truth(path).states) poses.push_back({s.t_ns, s.state.T_W_B});
   return poses;

@@ -29,7 +29,8 @@ struct PoseFile {
 
 struct PoseFormatOptions {
   PoseFormat format = PoseFormat::kAuto;
-  double kitti_rate_hz = 0.0;  // row i is stamped i / rate; KITTI files are refused where it is 0
+  double kitti_rate_hz = 0.0;   // row i is stamped i / rate; KITTI files are refused where it is 0
+  bool allow_unusable = false;  // as in PoseFileOptions; not for KITTI
 };
 
 // Throws DataError `file:line: rule` as read_tum does, and for a KITTI rotation that is not one to 1e-3.

@@ -5,15 +5,15 @@
 namespace plumbline::estimator {
 namespace {
 
-using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using RowPair3 = Eigen::Matrix<double, 2, 3>;
 template <int Columns>
 using Rows2 = Eigen::Matrix<double, 2, Columns, Eigen::RowMajor>;
 
 core::BalIntrinsics intrinsics_at(const double* x) { return {x[0], x[1], x[2]}; }
 
 // a [b]x for a row vector a: (a x b)^T.
-Matrix23 times_skew(const Matrix23& A, const Eigen::Vector3d& b) {
-  Matrix23 J;
+RowPair3 times_skew(const RowPair3& A, const Eigen::Vector3d& b) {
+  RowPair3 J;
   for (int i = 0; i < 2; ++i) J.row(i) = A.row(i).cross(b.transpose());
   return J;
 }
@@ -95,8 +95,8 @@ bool BalFactor::Evaluate(double const* const* parameters, double* residuals, dou
   const double cos = 1.0 - b * angle2;
   const Eigen::Vector3d RX = cos * X + a * w.cross(X) + (b * w.dot(X)) * w;
 
-  Matrix23 A;
-  Matrix23 J_intrinsics;
+  RowPair3 A;
+  RowPair3 J_intrinsics;
   const auto pixel =
       core::project_bal(intrinsics_at(parameters[0] + 6), axis_, RX + t, wanted ? &A : nullptr, &J_intrinsics);
   if (!pixel) return false;
@@ -105,7 +105,7 @@ bool BalFactor::Evaluate(double const* const* parameters, double* residuals, dou
 
   if (J_camera_data != nullptr) {
     Eigen::Map<Rows2<kBalCameraSize>> J(J_camera_data);
-    const Matrix23 G = -times_skew(A, RX);
+    const RowPair3 G = -times_skew(A, RX);
     // G Jl(w): G [w]x = G x w by rows.
     J.leftCols<3>() = a * G + b * times_skew(G, w) + (c * (G * w)) * w.transpose();
     J.middleCols<3>(3) = A;
@@ -128,8 +128,8 @@ bool BalLeftFactor::Evaluate(double const* const* parameters, double* residuals,
 
   const Eigen::Matrix3d R = q.toRotationMatrix();
   const Eigen::Vector3d RX = R * X;
-  Matrix23 A;
-  Matrix23 J_intrinsics;
+  RowPair3 A;
+  RowPair3 J_intrinsics;
   const auto pixel =
       core::project_bal(intrinsics_at(parameters[0] + 7), axis_, RX + t, wanted ? &A : nullptr, &J_intrinsics);
   if (!pixel) return false;

@@ -1,6 +1,6 @@
 // The subcommands of `plumbline`. Each returns the exit code:
 //   0 ok; 1 the answer is "worse", or trials failed beyond the allowed share; 2 bad input; 3 internal.
-// Bad input is thrown as core::InputError before anything is written; main() turns it into code 2.
+// Bad input is thrown as core::InputError before anything is written; program() turns it into code 2.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Trajectories to be compared, from files of other programs or of our own.
-//   an estimate   a pose file, or a folder with estimate.tum and meta.yaml
+//   an estimate   a pose file (TUM, TUM with covariance, EuRoC CSV), or a folder with estimate.tum and meta.yaml
 //   a truth       a pose file, or a dataset with its truth
 // Poses come back in the IMU clock. meta.yaml states `stamp_clock: imu | camera`; stamps of the camera's clock are
 // moved by the estimate's own `td_s` (or `calibration.td_s`), t_imu = t_cam + td: that is the instant it claims the

@@ -1,0 +1,175 @@
+#include "tools/program.h"
+
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <glog/logging.h>
+
+#include "core/error.h"
+#include "tools/ba_command.h"
+#include "tools/commands.h"
+#include "tools/version.h"
+
+// Of OpenBLAS, where it is the BLAS in use: one thread a trial, and the same bytes whatever the number of processors.
+extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+
+namespace plumbline::tools {
+namespace {
+
+template <class T>
+std::map<std::string, T> words(const auto& names) {
+  std::map<std::string, T> result;
+  for (std::size_t i = 0; i < names.size(); ++i) result.emplace(names[i], static_cast<T>(i));
+  return result;
+}
+
+int parse_and_run(int argc, const char* const* argv) {
+  CLI::App app{"Simulation and evaluation of visual-inertial estimators with a time offset and rolling shutter"};
+  app.set_version_flag("--version", fmt::format("plumbline {} ({})", version(), commit()));
+  app.require_subcommand(1);
+  const auto add_set = [](CLI::App* command, std::vector<std::string>& set) {
+    command->add_option("--set", set, "override a key, as in scenario.camera.td_s=0.02")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+  };
+
+  RunOptions run_options;
+  CLI::App* run_command = app.add_subcommand("run", "simulate, estimate and evaluate an experiment");
+  run_command->add_option("EXPERIMENT", run_options.experiment, "experiment file (YAML)")->required();
+  run_command->add_option("--out", run_options.out, "folder of the results; default out/NAME");
+  run_command->add_option("--trials", run_options.trials, "trials of each cell");
+  run_command->add_option("--jobs", run_options.jobs, "threads; default one a processor")->check(CLI::PositiveNumber);
+  run_command->add_flag("--fresh", run_options.fresh, "discard results of another configuration");
+  run_command->add_flag("--json", run_options.json, "print the summary as JSON");
+  add_set(run_command, run_options.set);
+
+  SimulateOptions simulate_options;
+  CLI::App* simulate_command = app.add_subcommand("simulate", "write one recording and its truth as a dataset");
+  simulate_command->add_option("SCENARIO", simulate_options.scenario, "scenario file (YAML)")->required();
+  simulate_command->add_option("--out", simulate_options.out, "folder of the dataset")->required();
+  simulate_command->add_option("--seed", simulate_options.seed, "seed of all draws");
+  simulate_command->add_option("--trial", simulate_options.trial, "which draw of noise and priors");
+  simulate_command->add_flag("--plot", simulate_options.plot,
+                             "draw path, world and a frame into plots/ of the dataset");
+  add_set(simulate_command, simulate_options.set);
+
+  EstimateOptions estimate_options;
+  CLI::App* estimate_command = app.add_subcommand("estimate", "estimate a dataset");
+  estimate_command->add_option("DATASET", estimate_options.dataset, "folder of the dataset")->required();
+  estimate_command->add_option("--estimator", estimate_options.estimator, "estimator file (YAML)");
+  estimate_command->add_option("--out", estimate_options.out, "folder of the estimate")->required();
+  add_set(estimate_command, estimate_options.set);
+
+  EvaluateOptions evaluate_options;
+  CLI::App* evaluate_command = app.add_subcommand("evaluate", "compare an estimated trajectory with the true one");
+  evaluate_command
+      ->add_option("ESTIMATE", evaluate_options.estimate, "pose file or folder of an estimate, or a folder of many")
+      ->required();
+  evaluate_command
+      ->add_option("--truth", evaluate_options.truth, "pose file or dataset, or a folder with one for each estimate")
+      ->required();
+  evaluate_command->add_option("--align", evaluate_options.alignment, "none, posyaw, se3 or sim3")
+      ->transform(CLI::CheckedTransformer(words<eval::Alignment>(eval::kAlignmentNames)));
+  CLI::Option* first = evaluate_command->add_option("--first", evaluate_options.first_n, "align by the first N poses")
+                           ->check(CLI::NonNegativeNumber);
+  evaluate_command->add_option("--first-s", evaluate_options.first_s, "align by the poses of the first T seconds")
+      ->check(CLI::PositiveNumber)
+      ->excludes(first);
+  evaluate_command
+      ->add_option("--rpe", evaluate_options.deltas,
+                   "relative errors over frames (f), seconds, metres or % of the path")
+      ->type_name("10m,1s,20f,10%")
+      ->capture_default_str();
+  evaluate_command->add_flag("--json", evaluate_options.json, "print JSON");
+
+  CompareOptions compare_options;
+  CLI::App* compare_command = app.add_subcommand("compare", "is B worse than A? paired by cell, trial and seed");
+  compare_command->add_option("OUT_A", compare_options.a, "folder of the results of A")->required();
+  compare_command->add_option("OUT_B", compare_options.b, "folder of the results of B")->required();
+  compare_command->add_option("--metric", compare_options.metrics, "compare this one only; may be repeated")
+      ->allow_extra_args(false);
+  compare_command->add_option("--alpha", compare_options.alpha, "probability of a false alarm over all tests")
+      ->check(CLI::Range(1e-9, 0.5))
+      ->capture_default_str();
+  compare_command->add_flag("--json", compare_options.json, "print JSON");
+
+  ReplayOptions replay_options;
+  CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a finished experiment again");
+  replay_command->add_option("OUT_DIR", replay_options.results, "folder of the results")->required();
+  replay_command->add_option("RUN_ID", replay_options.run_id, "as in results.jsonl")->required();
+  replay_command->add_option("--out", replay_options.out, "write dataset, estimate and series there");
+
+  BaOptions ba_options;
+  CLI::App* ba_command = app.add_subcommand("ba", "adjust a bundle: a problem file of BAL");
+  ba_command->add_option("PROBLEM", ba_options.problem, "BAL file, plain or bzip2")->required();
+  ba_command
+      ->add_option("--solver", ba_options.adjustment.solver, "automatic, dense_schur, sparse_schur, iterative_schur")
+      ->transform(CLI::CheckedTransformer(words<estimator::BundleSolver>(estimator::kBundleSolverNames)));
+  ba_command
+      ->add_option("--rotation", ba_options.adjustment.rotation, "perturbation: angle_axis (as in the file) or left")
+      ->transform(CLI::CheckedTransformer(words<estimator::BundleRotation>(estimator::kBundleRotationNames)));
+  ba_command->add_option("--iterations", ba_options.adjustment.max_iterations, "at most so many steps")
+      ->check(CLI::PositiveNumber);
+  ba_command->add_option("--threads", ba_options.adjustment.threads, "threads of the solver")
+      ->check(CLI::PositiveNumber);
+  ba_command->add_option("--truth", ba_options.truth,
+                         "true cameras and points (BAL file), compared after Sim3 alignment");
+  ba_command->add_option("--out", ba_options.out, "write the adjusted problem; compressed where it ends in .bz2");
+  ba_command->add_flag("--json", ba_options.json, "print JSON");
+
+  SimulateBaOptions simulate_ba_options;
+  sim::BalWorldConfig& bal_world = simulate_ba_options.world;
+  CLI::App* simulate_ba_command =
+      app.add_subcommand("simulate-ba", "write a bundle problem and its truth as BAL files");
+  simulate_ba_command->add_option("--out", simulate_ba_options.out, "folder for problem.txt and truth.txt")->required();
+  simulate_ba_command->add_option("--seed", simulate_ba_options.seed, "seed of all draws");
+  simulate_ba_command->add_option("--cameras", bal_world.cameras, "cameras on a ring")->check(CLI::Range(3, 100000));
+  simulate_ba_command->add_option("--points", bal_world.points, "points inside the ring")
+      ->check(CLI::Range(10, 100000000));
+  simulate_ba_command->add_option("--pixel-sigma-px", bal_world.pixel_sigma_px, "noise of an observation")
+      ->check(CLI::NonNegativeNumber);
+
+  CheckOptions check_options;
+  CLI::App* check_command = app.add_subcommand("check", "check configuration files");
+  check_command->add_option("CONFIG", check_options.files, "experiments, scenarios or estimators");
+  check_command->add_flag("--keys", check_options.keys, "print all keys with defaults and rules");
+  add_set(check_command, check_options.set);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitOk : kExitBadInput;
+  }
+  if (*run_command) return run(run_options);
+  if (*simulate_command) return simulate(simulate_options);
+  if (*estimate_command) return estimate(estimate_options);
+  if (*evaluate_command) return evaluate(evaluate_options);
+  if (*compare_command) return compare(compare_options);
+  if (*replay_command) return replay(replay_options);
+  if (*ba_command) return ba(ba_options);
+  if (*simulate_ba_command) return simulate_ba(simulate_ba_options);
+  return check(check_options);
+}
+
+}  // namespace
+
+int program(int argc, const char* const* argv) {
+  if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
+  // Ceres warns of every step that it rejects; what matters comes back as a status.
+  FLAGS_minloglevel = google::GLOG_FATAL;
+  try {
+    return parse_and_run(argc, argv);
+  } catch (const core::InputError& error) {
+    fmt::print(stderr, "plumbline: {}\n", error.what());
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "plumbline: internal error: {}\n", error.what());
+    return kExitInternal;
+  }
+}
+
+}  // namespace plumbline::tools
