@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "estimator/batch_problem.h"
 #include "estimator/factors/world_point.h"
+#include "eval/metric_bound.h"
 #include "eval/trajectory_error.h"
 #include "sim/simulate.h"
 
@@ -102,11 +103,9 @@ void expect_same(const core::PosteriorCovariance& a, const core::PosteriorCovari
   }
 }
 
-TEST_F(Bound, EqualsTheDenseInverseAtTheTruth) {  // The factor stops its search of the row at 1e-5 px, which leaves
-                                                  // 1e-9 of a derivative. (The chain alone meets a dense
-  // inverse to 1e-10: information_chain_test.)
-  expect_same(bound({}).covariance, brute_force({}), 1e-8);
-}
+// The factor stops its search of the row at 1e-5 px, which leaves 1e-9 of a derivative. (The chain alone meets a dense
+// inverse to 1e-10: information_chain_test.)
+TEST_F(Bound, EqualsTheDenseInverseAtTheTruth) { expect_same(bound({}).covariance, brute_force({}), 1e-8); }
 
 TEST_F(Bound, HoldsWhatIsNotFree) {
   estimator::EstimatorConfig config;
@@ -130,6 +129,13 @@ TEST_F(Bound, CausalBoundFallsToTheFullOne) {
   // Before there is parallax td is known as well as its prior says.
   EXPECT_NEAR(std::sqrt(b.causal.front().covariance(core::kCovTd, core::kCovTd)), log().prior.calibration_sigma.td_s,
               1e-2 * log().prior.calibration_sigma.td_s);
+
+  const std::vector<BoundPoint> series = bound_series(b, b.t_ns.front());
+  ASSERT_EQ(series.size(), b.causal.size());
+  EXPECT_DOUBLE_EQ(series.back().t_s, core::to_seconds(b.t_ns.back() - b.t_ns.front()));
+  EXPECT_NEAR(series.back().td_s, *metric_bound(b, "td_error_s"), 1e-5 * series.back().td_s);
+  EXPECT_NEAR(series.back().position_m, *metric_bound(b, "final_position"), 1e-5 * series.back().position_m);
+  EXPECT_NEAR(core::kDegreesPerRadian * series.back().orientation_rad, *metric_bound(b, "final_orientation_deg"), 1e-6);
 }
 
 TEST_F(Bound, LastPoseIsThatOfTheLastState) {

@@ -52,4 +52,21 @@ void add_bounds(const CramerRaoBound& bound, std::vector<Metric>& metrics) {
   for (Metric& metric : metrics) metric.crlb = metric_bound(bound, metric.name);
 }
 
+std::vector<BoundPoint> bound_series(const CramerRaoBound& bound, core::TimeNs start) {
+  std::vector<core::TimeNs> stamps;
+  stamps.reserve(bound.causal.size());
+  for (const CausalBound& causal : bound.causal) stamps.push_back(causal.t_ns);
+  std::vector<BoundPoint> points;
+  for (const int k : grid_indices(stamps)) {
+    const CausalBound& causal = bound.causal[static_cast<std::size_t>(k)];
+    const auto root = [&](int row, int dof) { return std::sqrt(causal.covariance.diagonal().segment(row, dof).sum()); };
+    points.push_back({.t_s = core::to_seconds(causal.t_ns - start),
+                      .td_s = root(core::kCovTd, 1),
+                      .readout_s = root(core::kCovReadout, 1),
+                      .position_m = root(kState + core::kPosition, 3),
+                      .orientation_rad = root(kState + core::kOrientation, 3)});
+  }
+  return points;
+}
+
 }  // namespace plumbline::eval

@@ -92,6 +92,13 @@ ordered_json to_json(const Series& series) {
                     {"velocity", column(series.nees, &NeesPoint::velocity)},
                     {"bias", column(series.nees, &NeesPoint::bias)}};
   }
+  if (!series.bound.empty()) {
+    json["bound"] = {{"t_s", column(series.bound, &BoundPoint::t_s)},
+                     {"td_s", column(series.bound, &BoundPoint::td_s)},
+                     {"readout_s", column(series.bound, &BoundPoint::readout_s)},
+                     {"position_m", column(series.bound, &BoundPoint::position_m)},
+                     {"orientation_rad", column(series.bound, &BoundPoint::orientation_rad)}};
+  }
   return json;
 }
 

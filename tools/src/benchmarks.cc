@@ -3,6 +3,8 @@
 
 #include "estimator/estimate.h"
 #include "estimator/factors/preintegration.h"
+#include "estimator/keyframes.h"
+#include "eval/cramer_rao.h"
 #include "sim/simulate.h"
 
 namespace plumbline {
@@ -79,6 +81,17 @@ void batch_solve(benchmark::State& state) {
   state.counters["observations"] = observations;
 }
 BENCHMARK(batch_solve)->Unit(benchmark::kSecond)->Iterations(3);
+
+// The Cramer-Rao bound of the same problem, without and with that of every instant.
+void bound(benchmark::State& state) {
+  const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
+  const eval::BoundOptions options{.frames = estimator::select_keyframes(s.measurements.frames, 10.0),
+                                   .causal = state.range(0) != 0};
+  for ([[maybe_unused]] auto _ : state) {
+    benchmark::DoNotOptimize(eval::cramer_rao_bound(s.measurements, s.truth, options));
+  }
+}
+BENCHMARK(bound)->ArgName("causal")->Arg(0)->Arg(1)->Unit(benchmark::kSecond);
 
 void preintegrate_20_samples(benchmark::State& state) {
   const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});

@@ -30,8 +30,7 @@ class ThreadClock {
 };
 
 // NEES speaks of a prior whose mean was drawn with the covariance that the estimator is given. Exact means leave no
-// room for it at all, and a fixed mean of td none for td's
-// and for what holds td.
+// room for it at all, and a fixed mean of td none for td's and for what holds td.
 void withhold_nees(const sim::PriorConfig& prior, std::vector<eval::Metric>& metrics) {
   const bool exact = prior.means == sim::PriorMeans::kTruth;
   for (eval::Metric& metric : metrics) {
@@ -45,7 +44,7 @@ void withhold_nees(const sim::PriorConfig& prior, std::vector<eval::Metric>& met
 
 // The bound of what the estimator was given: the keyframes' observations.
 void add_bound(const Experiment& experiment, const core::MeasurementLog& measurements, const sim::GroundTruth& truth,
-               std::vector<eval::Metric>& metrics) {
+               core::TimeNs start, eval::TrialResult& result) {
   const estimator::EstimateWhat& free = experiment.estimator.estimate;
   const eval::CramerRaoBound bound = eval::cramer_rao_bound(
       measurements, truth,
@@ -53,9 +52,11 @@ void add_bound(const Experiment& experiment, const core::MeasurementLog& measure
        .td = free.td,
        .readout = free.readout,
        .extrinsics = free.extrinsics,
-       .alignment = experiment.metrics.alignment});
-  eval::add_bounds(bound, metrics);
-  metrics.push_back({std::string(eval::kKappa2), bound.kappa2});
+       .alignment = experiment.metrics.alignment,
+       .causal = true});
+  eval::add_bounds(bound, result.metrics);
+  result.metrics.push_back({std::string(eval::kKappa2), bound.kappa2});
+  result.series.bound = eval::bound_series(bound, start);
 }
 
 }  // namespace
@@ -69,7 +70,9 @@ eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, T
   t.estimate_s = clock.lap();
   eval::TrialResult result = eval::evaluate(estimate, truth, experiment.metrics);
   withhold_nees(experiment.scenario.prior, result.metrics);
-  if (experiment.metrics.crlb && result.ok) add_bound(experiment, measurements, truth, result.metrics);
+  if (experiment.metrics.crlb && result.ok) {
+    add_bound(experiment, measurements, truth, estimate.states.front().t_ns, result);
+  }
   t.evaluate_s = clock.lap();
   if (timings != nullptr) *timings = t;
   return result;

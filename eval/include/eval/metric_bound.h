@@ -9,6 +9,7 @@
 
 #include "eval/cramer_rao.h"
 #include "eval/metrics.h"
+#include "eval/series.h"
 
 namespace plumbline::eval {
 
@@ -17,5 +18,8 @@ namespace plumbline::eval {
 std::optional<double> metric_bound(const CramerRaoBound& bound, std::string_view metric);
 
 void add_bounds(const CramerRaoBound& bound, std::vector<Metric>& metrics);
+
+// The causal bounds on the grid of a series; `start` is the stamp of the first estimated state.
+std::vector<BoundPoint> bound_series(const CramerRaoBound& bound, core::TimeNs start);
 
 }  // namespace plumbline::eval

@@ -36,10 +36,21 @@ struct NeesPoint {
   double bias = 0.0;      // 6 dof, [gyroscope | accelerometer]
 };
 
+// Roots of the Cramer-Rao bound from the measurements up to an instant (eval/cramer_rao.h), of a vector that of the
+// trace: the least that an online estimator's standard deviation can be. 0 for what is held.
+struct BoundPoint {
+  double t_s = 0.0;  // since the first estimated state
+  double td_s = 0.0;
+  double readout_s = 0.0;
+  double position_m = 0.0;  // of that instant's state, unaligned
+  double orientation_rad = 0.0;
+};
+
 struct Series {
   std::vector<SeriesPoint> points;
   std::vector<TimeOffsetPoint> td;  // empty where the estimator keeps no history
   std::vector<NeesPoint> nees;      // likewise
+  std::vector<BoundPoint> bound;    // empty without eval.crlb
 };
 
 // The indices of at most `points` of the sorted stamps: those nearest to a uniform grid from the first to the last.
@@ -51,7 +62,9 @@ Series make_series(const std::vector<PosePair>& pairs, const TrajectoryErrors& e
 
 // Columns as arrays: {"t_s": [...], "position_error_m": [x, y, z], "rotation_error_rad": [x, y, z],
 //  "estimate": [px, py, pz, qx, qy, qz, qw], "truth": likewise, "td": {"t_s", "td_error_s", "sigma_s"},
-//  "nees": {"t_s", "pose", "velocity", "bias"}}, each letter an array; td and nees only where there is a history.
+//  "nees": {"t_s", "pose", "velocity", "bias"}, "bound": {"t_s", "td_s", "readout_s", "position_m",
+//  "orientation_rad"}},
+// each letter an array; td and nees only where there is a history, bound only with eval.crlb.
 nlohmann::ordered_json to_json(const Series& series);
 
 }  // namespace plumbline::eval
