@@ -192,6 +192,8 @@ TEST_F(BalFile, DamagedCompressionIsRefused) {
   EXPECT_THAT(message(flipped), HasSubstr("p.bz2:1: a damaged bzip2 stream"));
   EXPECT_THAT(message(std::string_view(good).substr(0, good.size() - 5)),
               HasSubstr("p.bz2:1: a truncated bzip2 stream"));
+  EXPECT_THAT(message(bzip2_compress(kProblem + std::string(5'000'000, ' '))),
+              HasSubstr("p.bz2:1: a bzip2 stream of implausible length"));
   EXPECT_THAT(message("BZh"), HasSubstr("p.bz2:1: a truncated bzip2 stream"));
   EXPECT_THAT(message("BZh9 no more"), HasSubstr("p.bz2:1: a damaged bzip2 stream"));
   EXPECT_THAT(message(good + "tail"), HasSubstr("p.bz2:1: bytes that belong to no bzip2 stream"));

@@ -1,4 +1,5 @@
 // Each defect of the camera does what sim/camera_sensor.h and sim/pixel_noise.h say, and nothing else.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -77,6 +78,39 @@ TEST(CameraDefects, ExposureShiftsTdWhereStampsAreOfItsStart) {
   config.camera.td_s -= 0.005;  // the same rig again, told otherwise
   const auto start = frames_of(config);
   for_each_pair(reference, start, [](const auto& a, const auto& b) { EXPECT_LT((a - b).norm(), 1e-9); });
+}
+
+// td, readout and exposure decide which frames a recording can hold, not what is drawn for them: a rig at rest sees the
+// same noise at the same stamps.
+TEST(CameraDefects, TimingChangesNoDraw) {
+  ScenarioConfig config = some_config();
+  config.trajectory.type = TrajectoryType::kStatic;
+  config.camera.td_s = -0.001;
+  config.camera.readout_s = 0.0;
+  config.camera.uniform_outlier_probability = 0.1;
+  config.points.loss_probability = 0.0;
+  const auto reference = frames_of(config);
+  const auto expect_same_draws = [&](const std::vector<core::Frame>& frames) {
+    std::size_t common = 0;
+    for (const core::Frame& frame : frames) {
+      const auto other = std::find_if(reference.begin(), reference.end(),
+                                      [&](const core::Frame& f) { return f.t_cam_ns == frame.t_cam_ns; });
+      if (other == reference.end()) continue;
+      ++common;
+      EXPECT_TRUE(same_points(frame, *other)) << frame.t_cam_ns;
+    }
+    EXPECT_GT(common, 50U);
+    return frames.front().t_cam_ns != reference.front().t_cam_ns;
+  };
+  bool first_frame_moved = false;
+  config.camera.exposure_s = 0.008;
+  config.camera.exposure_stamp = ExposureStamp::kStart;
+  first_frame_moved |= expect_same_draws(frames_of(config));
+  config.camera.td_s = 0.02;
+  first_frame_moved |= expect_same_draws(frames_of(config));
+  config.camera.readout_s = 0.03;
+  first_frame_moved |= expect_same_draws(frames_of(config));
+  EXPECT_TRUE(first_frame_moved);
 }
 
 TEST(CameraDefects, DroppedFramesAreMissingAndChangeNoOther) {

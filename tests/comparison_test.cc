@@ -35,7 +35,8 @@ std::vector<CellOutcomes> variant(double factor, const std::string& name, int tr
       row.ok = true;
       const double ate = 0.01 * std::exp(shared.normal(index) + 0.05 * own.normal(index)) * factor;
       const double td = 1e-5 * shared.normal(index, 1) * std::exp(0.05 * own.normal(index, 1));
-      row.metrics = {{"ate_position_m", ate}, {"td_error_s", td}};
+      // kappa2 is no error, whichever way it moves.
+      row.metrics = {{"ate_position_m", ate}, {"td_error_s", td}, {std::string(kKappa2), 0.01 * factor}};
       cell.add(row);
     }
   }

@@ -91,5 +91,16 @@ TEST_F(PipelineConsistency, ResidualsAreAsLargeAsTheirNoise) {
   EXPECT_TRUE(band.contains(squares_)) << squares_ / dof_;
 }
 
+TEST_F(PipelineConsistency, ResidualsTellNoiseThatIsNotAsBelieved) {
+  const sim::Simulation s = sim::simulate(scenario(), {5, 0});
+  for (const double believed_px : {0.8, 1.25}) {
+    estimator::EstimatorConfig config;
+    config.pixel_sigma_px = believed_px;
+    const core::SolveSummary summary = estimator::estimate(s.measurements, config).summary;
+    const int dof = summary.residuals - summary.parameters;
+    EXPECT_FALSE(eval::chi_square_mean_band(dof, 1, 0.999).contains(2.0 * summary.final_cost)) << believed_px;
+  }
+}
+
 }  // namespace
 }  // namespace plumbline

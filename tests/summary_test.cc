@@ -123,8 +123,51 @@ TEST(Summary, SignedErrorsHaveExactIntervalsOthersDoNot) {
   const CellSummary cell = summarise(kRows, {});
   const Interval exact = rmse_interval(cell.metrics[1].rmse, 4, 0.95);
   EXPECT_EQ(cell.metrics[1].rmse_ci95.value_or(Interval{}).hi, exact.hi);
-  EXPECT_EQ(cell.metrics[0].rmse_ci95.value_or(Interval{}).hi,
-            rms_interval({0.01, 0.02, 0.03, 0.02}, 0.95).value_or(Interval{-1.0, -1.0}).hi);
+  EXPECT_FALSE(cell.metrics[0].rmse_ci95.has_value());  // too few for the logarithm
+  std::vector<Row> rows;
+  std::vector<double> ate;
+  for (int i = 0; i < 20; ++i) {
+    ate.push_back(0.01 + 1e-4 * i);
+    rows.push_back(row(1e-5, 1.0, ate.back()));
+  }
+  EXPECT_EQ(summarise(rows, {}).metrics[0].rmse_ci95.value_or(Interval{}).hi,
+            rms_interval(ate, 0.95).value_or(Interval{-1.0, -1.0}).hi);
+  rows.pop_back();
+  EXPECT_FALSE(summarise(rows, {}).metrics[0].rmse_ci95.has_value());
+}
+
+// efficiency = sqrt(sum e^2 / sum b^2): errors of 30, -10, 20 and 0 us against bounds of 10, 10, 20 and 20 us.
+TEST(Summary, EfficiencyIsClaimedWhereTheBoundIsTheBound) {
+  std::vector<Row> rows = kRows;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    rows[i].metrics[1].crlb = i < 2 ? 1e-5 : 2e-5;
+    rows[i].metrics.push_back({std::string(kKappa2), 0.049});
+  }
+  const CellSummary cell = summarise(rows, {});
+  const MetricSummary& td = cell.metrics[1];
+  ASSERT_TRUE(td.bound.has_value());
+  EXPECT_NEAR(td.bound->crlb, std::sqrt(2.5) * 1e-5, 1e-18);
+  EXPECT_NEAR(td.bound->efficiency.value_or(0.0), std::sqrt(14.0 / 10.0), 1e-12);
+  const Interval interval = td.bound->efficiency_ci95.value_or(Interval{});
+  EXPECT_NEAR(interval.hi, rmse_interval(td.rmse, 4, 0.95).hi / td.bound->crlb, 1e-12);
+  EXPECT_FALSE(cell.metrics[0].bound.has_value());
+  EXPECT_EQ(cell.note, "");
+  EXPECT_TRUE(to_json(cell).at("metrics").at("td_error_s").contains("efficiency_ci95"));
+  EXPECT_NE(summary_table({cell}).find("1.18"), std::string::npos);
+
+  const auto expect_withheld = [](const CellSummary& c, const std::string& note) {
+    ASSERT_TRUE(c.metrics[1].bound.has_value());
+    EXPECT_FALSE(c.metrics[1].bound->efficiency.has_value());
+    EXPECT_FALSE(c.metrics[1].bound->efficiency_ci95.has_value());
+    EXPECT_NE(c.note.find(note), std::string::npos) << c.note;
+  };
+  std::vector<Row> partly = rows;
+  partly.push_back(failed());
+  expect_withheld(summarise(partly, {}), "1 of 5 trials failed");
+  rows[2].metrics.back().value = 0.051;
+  expect_withheld(summarise(rows, {}), "kappa2");
+  rows[2].metrics[1].crlb.reset();  // one trial without
+  EXPECT_FALSE(summarise(rows, {}).metrics[1].bound.has_value());
 }
 
 TEST(Summary, AFailedTrialCountsAndTakesNeesAway) {
@@ -135,7 +178,7 @@ TEST(Summary, AFailedTrialCountsAndTakesNeesAway) {
   EXPECT_EQ(cell.n_ok, 4);
   EXPECT_NEAR(cell.metrics[1].mean, 1e-5, 1e-18);
   for (const MetricSummary& m : cell.metrics) EXPECT_FALSE(m.nees.has_value());
-  EXPECT_EQ(cell.note, "no NEES is claimed: 1 of 5 trials failed");
+  EXPECT_EQ(cell.note, "no NEES or efficiency is claimed: 1 of 5 trials failed");
   const auto json = to_json(cell);
   EXPECT_EQ(json.at("note"), cell.note);
   EXPECT_FALSE(json.at("metrics").at("td_error_s").contains("nees_mean"));
@@ -188,22 +231,22 @@ TEST(SummaryTable, ReadsAsMeant) {
   EXPECT_EQ(table,
             R"(scenario.camera.td_s = 0.005, estimator.timing = propagated                                   4/4 ok
   metric                        mean      rmse [95 % interval]         median   NEES  (95 % band)
-  ATE position [mm]            20.00     21.21 [11.80, 38.13]           20.00
+  ATE position [mm]            20.00     21.21                          20.00
   td error [us]                10.00     18.71 [11.21, 53.76]           10.00   0.70  (0.12, 2.79)
   extrinsic, joint                                                              6.00  (3.10, 9.84)
 
 scenario.camera.td_s = 0.01                                                                   4/5 ok
   metric                        mean      rmse [95 % interval]         median   NEES  (95 % band)
-  ATE position [mm]            20.00     21.21 [11.80, 38.13]           20.00
+  ATE position [mm]            20.00     21.21                          20.00
   td error [us]                10.00     18.71 [11.21, 53.76]           10.00
-  no NEES is claimed: 1 of 5 trials failed
+  no NEES or efficiency is claimed: 1 of 5 trials failed
 
 all trials                                                                                    0/1 ok
   no trial succeeded
 
 all trials                                                                                    4/4 ok
   metric                        mean      rmse [95 % interval]         median   NEES  (95 % band)
-  ATE position [mm]            20.00     21.21 [11.80, 38.13]           20.00
+  ATE position [mm]            20.00     21.21                          20.00
   td error [us]                10.00     18.71 [11.21, 53.76]           10.00  70.00! (0.12, 2.79)
   extrinsic, joint                                                              6.00  (3.10, 9.84)
 )");

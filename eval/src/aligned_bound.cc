@@ -64,6 +64,9 @@ AlignedBound aligned_bound(const InformationChain& chain, const std::vector<core
       trace_theta -= 2.0 * (truth[k].q.toRotationMatrix().transpose() * U).cwiseProduct(covariance).sum();
     }
   }
+  if (!std::isfinite(trace_p) || !std::isfinite(trace_theta)) {
+    throw std::domain_error("the covariance of the aligned errors is not finite");
+  }
   return {.position_m = std::sqrt(std::max(0.0, trace_p) / N),
           .rotation_rad = std::sqrt(std::max(0.0, trace_theta) / N)};
 }

@@ -79,8 +79,7 @@ std::vector<std::string> common_metrics(const CellOutcomes& a, const CellOutcome
   for (const std::string& name : wanted.empty() ? a.metrics : wanted) {
     const bool both = position(a.metrics, name) < a.metrics.size() && position(b.metrics, name) < b.metrics.size();
     if (!wanted.empty() && !both) throw core::DataError(fmt::format("not both hold a metric '{}'", name));
-    const bool in_table = metric_info(name).in_table && name != kTdConvergence;
-    if (both && (!wanted.empty() || in_table)) names.push_back(name);
+    if (both && (!wanted.empty() || metric_info(name).in_table)) names.push_back(name);
   }
   return names;
 }

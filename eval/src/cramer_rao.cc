@@ -74,23 +74,29 @@ class Builder {
   }
 
  private:
-  // State 0 at the prior's stamp, state k + 1 at the IMU sample nearest to the middle row of frame k.
+  // State 0 at the prior's stamp, state k + 1 at the IMU sample nearest to the middle row of frame k. Samples are those
+  // of the log: the truth also has the ones that dropped out.
   void place_states() {
     const auto nearest = [&](core::TimeNs t_ns) {
-      const auto after = std::lower_bound(truth_.states.begin(), truth_.states.end(), t_ns,
-                                          [](const core::StampedState& s, core::TimeNs t) { return s.t_ns < t; });
-      if (after == truth_.states.begin()) return std::size_t{0};
-      const auto i = static_cast<std::size_t>(after - truth_.states.begin());
-      if (after == truth_.states.end() || t_ns - (after - 1)->t_ns <= after->t_ns - t_ns) return i - 1;
+      const auto after = std::lower_bound(log_.imu.begin(), log_.imu.end(), t_ns,
+                                          [](const core::ImuSample& s, core::TimeNs t) { return s.t_ns < t; });
+      if (after == log_.imu.begin()) return std::size_t{0};
+      const auto i = static_cast<std::size_t>(after - log_.imu.begin());
+      if (after == log_.imu.end() || t_ns - (after - 1)->t_ns <= after->t_ns - t_ns) return i - 1;
       return i;
     };
     samples_.push_back(nearest(log_.prior.t_ns));
     for (const std::size_t frame : options_.frames) {
       samples_.push_back(nearest(log_.frames[frame].t_cam_ns + core::to_ns(truth_.calibration.td_s)));
+      if (samples_.back() <= samples_[samples_.size() - 2]) {
+        throw std::domain_error("two states of the bound fall on one IMU sample");
+      }
     }
+    for (const std::size_t sample : samples_) true_states_.push_back(sim::state_at(truth_, log_.imu[sample].t_ns));
   }
 
-  const core::State& state(std::size_t i) const { return truth_.states[samples_[i]].state; }
+  const core::State& state(std::size_t i) const { return true_states_[i]; }
+  core::TimeNs stamp(std::size_t i) const { return log_.imu[samples_[i]].t_ns; }
 
   void linearise_observations() {
     const estimator::CameraModel model{log_.camera, log_.pixel_sigma_px, log_.gravity_m_s2};
@@ -104,8 +110,7 @@ class Builder {
       const core::Frame& frame = log_.frames[options_.frames[k]];
       const core::State& x = state(k + 1);
       const auto motion = std::make_shared<LocalMotion>(log_.imu, samples_[k + 1], reach_s, x.bias);
-      const estimator::FrameTiming timing{motion,
-                                          core::to_seconds(frame.t_cam_ns - truth_.states[samples_[k + 1]].t_ns)};
+      const estimator::FrameTiming timing{motion, core::to_seconds(frame.t_cam_ns - stamp(k + 1))};
       for (const core::PointObservation& point : frame.points) {
         const auto landmark = truth_.track_landmark.find(point.track_id);
         if (landmark == truth_.track_landmark.end()) continue;  // a false track has no truth
@@ -238,7 +243,7 @@ class Builder {
     for (const int t : alive_) weak.push_back(tracks_[static_cast<std::size_t>(t)].variable);
     const Layout l = layout();
     const Eigen::MatrixXd scaled = chain_.causal_covariance(calibration_and(states_[k + 1]), weak);
-    CausalBound causal{.t_ns = truth_.states[samples_[k + 1]].t_ns};
+    CausalBound causal{.t_ns = stamp(k + 1)};
     causal.covariance(l.rows, l.rows) = l.units.asDiagonal() * scaled * l.units.asDiagonal();
     causal_.push_back(std::move(causal));
   }
@@ -247,7 +252,7 @@ class Builder {
     marginals_ = chain_.marginals();
     const Eigen::Matrix<double, 6, 1> units = state_units().head<6>();
     for (std::size_t i = 0; i < states_.size(); ++i) {
-      bound_.t_ns.push_back(truth_.states[samples_[i]].t_ns);
+      bound_.t_ns.push_back(stamp(i));
       const Eigen::MatrixXd& Sigma = marginals_[static_cast<std::size_t>(states_[i])];
       bound_.poses.push_back(units.asDiagonal() * Sigma.topLeftCorner<6, 6>() * units.asDiagonal());
     }
@@ -285,7 +290,8 @@ class Builder {
   const sim::GroundTruth& truth_;
   const BoundOptions& options_;
   std::vector<int> free_;                               // rows of the calibration that are free
-  std::vector<std::size_t> samples_;                    // of the states
+  std::vector<std::size_t> samples_;                    // of the states, in the log
+  std::vector<core::State> true_states_;                // there
   std::vector<std::vector<Observation>> observations_;  // of each frame
   std::vector<TrackInfo> tracks_;
   double mean_gap_s_ = 0.0;

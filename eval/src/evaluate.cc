@@ -149,6 +149,8 @@ std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const Covar
   m.add("final_orientation_deg", m.norm3(kOrientation) * core::kDegreesPerRadian, indices(kOrientation, 3),
         m.is_free(kPose, 6));
   m.add("final_velocity", m.norm3(kVelocity), indices(kVelocity, 3), m.is_free(kVelocity, 3));
+  m.add("final_gyro_bias", m.norm3(kBias), indices(kBias, 3), m.is_free(kBias, 3));
+  m.add("final_accel_bias", m.norm3(kBias + 3), indices(kBias + 3, 3), m.is_free(kBias + 3, 3));
   m.add("final_bias", m.norm3(kBias), indices(kBias, 6), m.is_free(kBias, 6));
   m.add("final_state", position_m, last, true);
   m.add("joint", position_m, joined(calibration, last), true);

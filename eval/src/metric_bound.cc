@@ -14,7 +14,7 @@ struct Block {
 };
 
 constexpr int kState = core::kCovLastState;
-constexpr std::array<Block, 10> kBlocks = {{
+constexpr std::array<Block, 11> kBlocks = {{
     {"td_error_s", core::kCovTd, 1, 1.0},
     {"readout_error_s", core::kCovReadout, 1, 1.0},
     {"extrinsic_position_m", core::kCovExtrinsicPosition, 3, 1.0},
@@ -24,7 +24,8 @@ constexpr std::array<Block, 10> kBlocks = {{
     {"final_position", kState + core::kPosition, 3, 1.0},
     {"final_orientation_deg", kState + core::kOrientation, 3, core::kDegreesPerRadian},
     {"final_velocity", kState + core::kVelocity, 3, 1.0},
-    {"final_bias", kState + core::kGyroBias, 3, 1.0},
+    {"final_gyro_bias", kState + core::kGyroBias, 3, 1.0},
+    {"final_accel_bias", kState + core::kAccelBias, 3, 1.0},
 }};
 
 }  // namespace
@@ -34,10 +35,10 @@ std::optional<double> metric_bound(const CramerRaoBound& bound, std::string_view
   if (metric == "ate_rotation_deg") return bound.ate.rotation_rad * core::kDegreesPerRadian;
   const core::PosteriorCovariance& P = bound.covariance;
   if (metric == "td_first_error_s") {
-    const double td = P(core::kCovTd, core::kCovTd);
-    const double readout = P(core::kCovReadout, core::kCovReadout);
-    if (!(td > 0.0 && readout > 0.0)) return std::nullopt;
-    return std::sqrt(td - P(core::kCovTd, core::kCovReadout) + 0.25 * readout);
+    const double variance = P(core::kCovTd, core::kCovTd) - P(core::kCovTd, core::kCovReadout) +
+                            0.25 * P(core::kCovReadout, core::kCovReadout);
+    if (!(variance > 0.0)) return std::nullopt;
+    return std::sqrt(variance);
   }
   for (const Block& block : kBlocks) {
     if (block.metric != metric) continue;
@@ -59,12 +60,15 @@ std::vector<BoundPoint> bound_series(const CramerRaoBound& bound, core::TimeNs s
   std::vector<BoundPoint> points;
   for (const int k : grid_indices(stamps)) {
     const CausalBound& causal = bound.causal[static_cast<std::size_t>(k)];
+    const PoseCovariance& pose = bound.poses[static_cast<std::size_t>(k) + 1];  // the first is the prior's
     const auto root = [&](int row, int dof) { return std::sqrt(causal.covariance.diagonal().segment(row, dof).sum()); };
     points.push_back({.t_s = core::to_seconds(causal.t_ns - start),
                       .td_s = root(core::kCovTd, 1),
                       .readout_s = root(core::kCovReadout, 1),
                       .position_m = root(kState + core::kPosition, 3),
-                      .orientation_rad = root(kState + core::kOrientation, 3)});
+                      .orientation_rad = root(kState + core::kOrientation, 3),
+                      .position_in_the_end_m = std::sqrt(pose.diagonal().head<3>().sum()),
+                      .orientation_in_the_end_rad = std::sqrt(pose.diagonal().tail<3>().sum())});
   }
   return points;
 }

@@ -97,7 +97,9 @@ ordered_json to_json(const Series& series) {
                      {"td_s", column(series.bound, &BoundPoint::td_s)},
                      {"readout_s", column(series.bound, &BoundPoint::readout_s)},
                      {"position_m", column(series.bound, &BoundPoint::position_m)},
-                     {"orientation_rad", column(series.bound, &BoundPoint::orientation_rad)}};
+                     {"orientation_rad", column(series.bound, &BoundPoint::orientation_rad)},
+                     {"position_in_the_end_m", column(series.bound, &BoundPoint::position_in_the_end_m)},
+                     {"orientation_in_the_end_rad", column(series.bound, &BoundPoint::orientation_in_the_end_rad)}};
   }
   return json;
 }

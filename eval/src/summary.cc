@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kConfidence = 0.95;
 constexpr double kThreeSigma = 0.9973002039367398;  // of a Gaussian within three standard deviations
+constexpr int kLogarithmTrials = 20;                // with fewer rms_interval covers too seldom
 constexpr int kAllAgree = 10'000;                   // trials, at which resampling would only take long
 
 void require_same_metrics(const Row& a, const Row& b) {
@@ -42,6 +43,7 @@ std::optional<Interval> root_mean_square_interval(const std::vector<double>& val
   const auto n = static_cast<int>(values.size());
   if (n < 2) return std::nullopt;
   if (is_signed) return rmse_interval(root_mean_square(values), n, kConfidence);
+  if (n < kLogarithmTrials) return std::nullopt;
   if (n < kBootstrapTrials || n >= kAllAgree) return rms_interval(values, kConfidence);
   return bca_interval(values, root_mean_square, kConfidence);
 }
@@ -142,7 +144,10 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
   if (ok.empty()) return cell;
   for (const Row* row : ok) require_same_metrics(*ok.front(), *row);
 
-  bool withheld = false;
+  const bool all_ok = cell.n_ok == cell.n;
+  const bool short_gaps = gaps_are_short(ok);
+  bool has_nees = false;
+  bool has_bound = false;
   for (std::size_t i = 0; i < ok.front()->metrics.size(); ++i) {
     const Metric& first = ok.front()->metrics[i];
     if (first.name == kTdConvergence) {
@@ -157,16 +162,19 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
       if (metric.nees) nees.push_back(*metric.nees);
     }
     cell.metrics.push_back(summarise_values(first.name, values));
-    cell.metrics.back().bound = summarise_bound(ok, i, cell.metrics.back(), cell.n_ok == cell.n && gaps_are_short(ok));
-    if (nees.empty()) continue;
-    if (cell.n_ok == cell.n) {
-      cell.metrics.back().nees = summarise_nees(nees, first.nees_dof);
-    } else {
-      withheld = true;
-    }
+    MetricSummary& metric = cell.metrics.back();
+    metric.bound = summarise_bound(ok, i, metric, all_ok && short_gaps);
+    if (all_ok && !nees.empty()) metric.nees = summarise_nees(nees, first.nees_dof);
+    has_nees = has_nees || !nees.empty();
+    has_bound = has_bound || metric.bound.has_value();
   }
-  if (cell.n_ok == cell.n) cell.nis = summarise_nis(ok);
-  if (withheld) cell.note = fmt::format("no NEES is claimed: {} of {} trials failed", cell.n - cell.n_ok, cell.n);
+  if (all_ok) cell.nis = summarise_nis(ok);
+  if (!all_ok && (has_nees || has_bound)) {
+    cell.note = fmt::format("no NEES or efficiency is claimed: {} of {} trials failed", cell.n - cell.n_ok, cell.n);
+  } else if (has_bound && !short_gaps) {
+    cell.note =
+        fmt::format("no efficiency is claimed: the bound neglects too much, kappa2 is above {}", kLargestKappa2);
+  }
   return cell;
 }
 

@@ -58,12 +58,16 @@ void append_title(std::string& out, const CellSummary& cell) {
   fmt::format_to(std::back_inserter(out), "{:<{}}  {}\n", rest, room, count);
 }
 
-// The last column of figures holds the bound where there is one, else the median.
+// The last columns of figures hold the bound and RMSE / bound where there is one, else the median.
 void append_metric(std::string& out, const MetricSummary& m, bool bound_column) {
   const MetricInfo info = metric_info(m.name);
   const std::string nees = m.nees ? nees_text(*m.nees) : "";
+  const auto last_columns = [&](const std::string& ratio) {
+    return bound_column ? fmt::format("{:>6} {}", ratio, nees) : nees;
+  };
   if (!info.in_table) {
-    if (m.nees) fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), info.label, "", "", "", "", nees);
+    if (m.nees)
+      fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), info.label, "", "", "", "", last_columns(""));
     return;
   }
   const double reference = m.rmse * info.table_unit;
@@ -71,7 +75,8 @@ void append_metric(std::string& out, const MetricSummary& m, bool bound_column) 
   const std::string interval =
       m.rmse_ci95 ? fmt::format("[{}, {}]", shown(m.rmse_ci95->lo), shown(m.rmse_ci95->hi)) : "";
   fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), info.label, shown(m.mean), shown(m.rmse), interval,
-                 bound_column ? (m.bound ? shown(m.bound->crlb) : "") : shown(m.median), nees);
+                 bound_column ? (m.bound ? shown(m.bound->crlb) : "") : shown(m.median),
+                 last_columns(m.bound && m.bound->efficiency ? fmt::format("{:.2f}", *m.bound->efficiency) : ""));
 }
 
 }  // namespace
@@ -87,13 +92,18 @@ std::string summary_table(const std::vector<CellSummary>& cells) {
       const bool has_bound = std::any_of(cell.metrics.begin(), cell.metrics.end(),
                                          [](const MetricSummary& m) { return m.bound.has_value(); });
       fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), "metric", "mean", "rmse", "[95 % interval]",
-                     has_bound ? "bound" : "median", "  NEES  (95 % band)");
+                     has_bound ? "bound" : "median", has_bound ? " ratio   NEES  (95 % band)" : "  NEES  (95 % band)");
       for (const MetricSummary& metric : cell.metrics) append_metric(out, metric, has_bound);
     }
     if (cell.td_convergence) {
       const ConvergenceSummary& c = *cell.td_convergence;
       fmt::format_to(std::back_inserter(out), "  td converged for good in {}/{} trials{}\n", c.n_converged, cell.n_ok,
                      c.median_s ? fmt::format(", median after {:.3g} s", *c.median_s) : "");
+    }
+    if (cell.nis) {
+      fmt::format_to(std::back_inserter(out), "  squared residuals per degree of freedom {:.4f}{}({:.4f}, {:.4f})\n",
+                     cell.nis->mean, cell.nis->band95.contains(cell.nis->mean) ? "  " : "! ", cell.nis->band95.lo,
+                     cell.nis->band95.hi);
     }
     if (!cell.note.empty()) fmt::format_to(std::back_inserter(out), "  {}\n", cell.note);
   }

@@ -105,7 +105,9 @@ CameraRecording simulate_camera(const Trajectory& trajectory, const World& world
   const auto first_frame = static_cast<std::int64_t>(std::ceil(first_s * camera.rate_hz));
   const auto last_frame = static_cast<std::int64_t>(std::floor(last_s * camera.rate_hz));
   for (std::int64_t n = first_frame; n <= last_frame; ++n) {
-    const auto index = static_cast<std::uint64_t>(n - first_frame);
+    // By the trigger's number and not by the recording's first: a frame's draws are the same whatever td, readout and
+    // exposure leave out before it. Negative numbers wrap around.
+    const auto index = static_cast<std::uint64_t>(n);
     const core::TimeNs trigger_ns = core::to_ns(static_cast<double>(n) / camera.rate_hz +
                                                 camera.trigger_jitter_s * cut_normal(trigger_jitter, index));
     const FrameView view(trajectory, camera.model, calibration, half_angle_rad, core::to_seconds(trigger_ns));

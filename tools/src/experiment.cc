@@ -176,8 +176,14 @@ void check_cell(const Experiment& e) {
       throw core::ConfigError("eval.crlb: is of an alignment by all poses; leave out first_n and first_s");
     }
     // The bound speaks of the true noise, whatever the estimator believes.
-    estimator::require_usable({e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px},
-                              e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
+    const core::ImuNoise& imu = e.scenario.imu.noise;
+    const double least = std::min({imu.gyro_noise_density, imu.gyro_bias_walk, imu.accel_noise_density,
+                                   imu.accel_bias_walk, e.scenario.camera.pixel_sigma_px});
+    if (!(least > 0.0)) {
+      throw core::ConfigError(
+          "eval.crlb: needs noise: scenario.camera.pixel_sigma_px and the four noises of "
+          "scenario.imu must be > 0");
+    }
   }
   const core::TrialId id{e.experiment.seed, 0};
   const auto trajectory = sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, id);

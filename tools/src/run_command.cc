@@ -103,6 +103,7 @@ ordered_json summarise_results(const Plan& plan, const std::filesystem::path& ou
   return {{"experiment", plan.base.experiment.name},
           {"git", commit()},
           {"config_hash", plan.config_hash},
+          {"error", eval::kErrorDefinition},
           {"cells", json_cells},
           {"runtime_s", runtime_summary(timings, plan.runs())}};
 }

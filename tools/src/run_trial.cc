@@ -29,15 +29,16 @@ class ThreadClock {
   double last_ = read();
 };
 
-// NEES speaks of a prior whose mean was drawn with the covariance that the estimator is given. Exact means leave no
-// room for it at all, and a fixed mean of td none for td's and for what holds td.
-void withhold_nees(const sim::PriorConfig& prior, std::vector<eval::Metric>& metrics) {
+// NEES and bound speak of a prior whose mean was drawn with the covariance that the estimator is given. Exact means
+// leave no room for them at all, and a fixed mean of td none for td's and for what holds td.
+void withhold_claims(const sim::PriorConfig& prior, std::vector<eval::Metric>& metrics) {
   const bool exact = prior.means == sim::PriorMeans::kTruth;
   for (eval::Metric& metric : metrics) {
     const bool of_td = metric.name.starts_with("td_") || metric.name == "calibration" || metric.name == "joint";
     if (exact || (prior.td_mean_s && of_td)) {
       metric.nees.reset();
       metric.nees_dof = 0;
+      metric.crlb.reset();
     }
   }
 }
@@ -69,10 +70,10 @@ eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, T
   const core::EstimateLog estimate = estimator::estimate(measurements, experiment.estimator);
   t.estimate_s = clock.lap();
   eval::TrialResult result = eval::evaluate(estimate, truth, experiment.metrics);
-  withhold_nees(experiment.scenario.prior, result.metrics);
   if (experiment.metrics.crlb && result.ok) {
     add_bound(experiment, measurements, truth, estimate.states.front().t_ns, result);
   }
+  withhold_claims(experiment.scenario.prior, result.metrics);
   t.evaluate_s = clock.lap();
   if (timings != nullptr) *timings = t;
   return result;

@@ -2,8 +2,9 @@
 // a smaller covariance than
 //   Sigma = ( P0^-1 + sum_i J_i^T J_i )^-1
 // J_i the whitened Jacobians of all inertial and visual measurements at the true states, with the exact camera timing
-// (`propagated`), landmarks with three degrees of freedom and no prior. Since priors are drawn as one more measurement,
-// this is the classical bound (Van Trees, 1968, section 2.4.2); the biases' walk is part of the measurement model.
+// (`propagated`), landmarks with three degrees of freedom and no prior. Rates and accelerations in them are those of
+// the samples, corrected by the true biases. Since priors are drawn as one more measurement, this is the classical
+// bound (Van Trees, 1968, section 2.4.2); the biases' walk is part of the measurement model.
 //
 // Landmarks are taken in world coordinates here, which any smooth choice of coordinates equals. Each track is a
 // landmark of its own, as to an estimator that does not recognise places. A direction in which no observation moves

@@ -14,7 +14,9 @@
 //   final_position        m, the same                                        3 dof
 //   final_orientation_deg  |Log(R_true^T R_est)| of the last state           3 dof
 //   final_velocity        m/s, norm of the error of the last state           3 dof
-//   final_bias            rad/s, norm of the last gyroscope bias' error      6 dof, [gyroscope | accelerometer] jointly
+//   final_gyro_bias       rad/s, norm of the error of the last state         3 dof
+//   final_accel_bias      m/s^2, norm of the error of the last state         3 dof
+//   final_bias            rad/s, as final_gyro_bias                          6 dof, [gyroscope | accelerometer] jointly
 //   final_state           m, as final_pose                                   15 dof
 //   joint                 m, as final_pose                                   calibration and final_state jointly
 //   nis_visual            mean squared whitened residual at the solution     -
@@ -48,10 +50,13 @@ struct MetricInfo {
   std::string_view label;   // in tables, with the unit
   double table_unit = 1.0;  // what a value is multiplied by in tables
   bool is_signed = false;   // a Gaussian error of mean 0 where the estimator is consistent
-  bool in_table = true;     // false: the value repeats another metric's, only the NEES is new
+  bool in_table = true;     // false: the value repeats another metric's or is no error; only a NEES is shown
 };
 
-inline constexpr std::array<MetricInfo, 18> kMetrics = {{
+inline constexpr std::string_view kTdConvergence = "td_convergence_s";
+inline constexpr std::string_view kKappa2 = "kappa2";
+
+inline constexpr std::array<MetricInfo, 22> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
@@ -65,15 +70,21 @@ inline constexpr std::array<MetricInfo, 18> kMetrics = {{
     {"final_position", "final position", 1e3, false, false},
     {"final_orientation_deg", "final orientation [deg]", 1.0},
     {"final_velocity", "final velocity [mm/s]", 1e3},
-    {"final_bias", "final gyro bias [deg/h]", 3600.0 * core::kDegreesPerRadian},
+    {"final_gyro_bias", "final gyro bias [deg/h]", 3600.0 * core::kDegreesPerRadian},
+    {"final_accel_bias", "final accel bias [mm/s2]", 1e3},
+    {"final_bias", "final biases, joint", 3600.0 * core::kDegreesPerRadian, false, false},
     {"final_state", "final state, joint", 1e3, false, false},
     {"joint", "calibration and state", 1e3, false, false},
     {"nis_visual", "visual residuals, squared", 1.0, false, false},
     {"nis_inertial", "inertial residuals, squared", 1.0, false, false},
+    {kTdConvergence, "td convergence [s]", 1.0, false, false},
+    {kKappa2, "kappa2 of the bound", 1.0, false, false},
 }};
 
-inline constexpr std::string_view kTdConvergence = "td_convergence_s";
-inline constexpr std::string_view kKappa2 = "kappa2";
+// As outputs state it; what covariances and NEES speak of.
+inline constexpr std::string_view kErrorDefinition =
+    "estimate - truth for positions, velocities, biases, td and readout, Log(R_truth^T R_est) for orientations; "
+    "unaligned, but for the ATE";
 
 // A metric that is not listed is shown under its own name and unit.
 constexpr MetricInfo metric_info(std::string_view name) {

@@ -44,6 +44,8 @@ struct BoundPoint {
   double readout_s = 0.0;
   double position_m = 0.0;  // of that instant's state, unaligned
   double orientation_rad = 0.0;
+  double position_in_the_end_m = 0.0;  // of the same state from all measurements
+  double orientation_in_the_end_rad = 0.0;
 };
 
 struct Series {
@@ -62,9 +64,9 @@ Series make_series(const std::vector<PosePair>& pairs, const TrajectoryErrors& e
 
 // Columns as arrays: {"t_s": [...], "position_error_m": [x, y, z], "rotation_error_rad": [x, y, z],
 //  "estimate": [px, py, pz, qx, qy, qz, qw], "truth": likewise, "td": {"t_s", "td_error_s", "sigma_s"},
-//  "nees": {"t_s", "pose", "velocity", "bias"}, "bound": {"t_s", "td_s", "readout_s", "position_m",
-//  "orientation_rad"}},
-// each letter an array; td and nees only where there is a history, bound only with eval.crlb.
+//  "nees": {"t_s", "pose", "velocity", "bias"}, "bound": {"t_s", "td_s", "readout_s", "position_m", "orientation_rad",
+//  "position_in_the_end_m", "orientation_in_the_end_rad"}}, each letter an array; td and nees only where there is a
+// history, bound only with eval.crlb.
 nlohmann::ordered_json to_json(const Series& series);
 
 }  // namespace plumbline::eval
