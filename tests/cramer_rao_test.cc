@@ -98,7 +98,11 @@ class Bound : public ::testing::Test {
   }
   const core::MeasurementLog& log() const { return simulation_.measurements; }
 
-  sim::Simulation simulation_ = sim::simulate(small_scenario(), {3, 0});
+  sim::Simulation simulation_ = [] {
+    sim::Simulation s = sim::simulate(small_scenario(), {3, 0});
+    s.measurements.imu = noise_free_imu(s.measurements, s.truth);  // what the bound linearises at
+    return s;
+  }();
 };
 
 // Each entry against the geometric mean of its diagonal ones.
@@ -186,11 +190,12 @@ core::PosteriorCovariance dense_bound(const core::MeasurementLog& log, const sim
   return P;
 }
 
-// A second: normal equations lose digits with the length of the recording.
+// Less than a second: normal equations lose digits with the length of the recording.
 TEST(CramerRaoBound, EqualsTheInverseOfTheDenseInformation) {
   sim::ScenarioConfig c = small_scenario();
-  c.duration_s = 1.0;
-  const auto [log, truth] = sim::simulate(c, {3, 0});
+  c.duration_s = 0.7;
+  auto [log, truth] = sim::simulate(c, {3, 0});
+  log.imu = noise_free_imu(log, truth);
   const std::vector<std::size_t> frames = every_second_frame(log);
   std::vector<std::size_t> samples = {0};
   for (const std::size_t k : frames) {
@@ -198,6 +203,37 @@ TEST(CramerRaoBound, EqualsTheInverseOfTheDenseInformation) {
   }
   expect_same(cramer_rao_bound(log, truth, {.frames = frames}).covariance, dense_bound(log, truth, frames, samples),
               1e-9);
+}
+
+// Central differences are off by the third derivatives: dt^2/6 of them.
+TEST(CramerRaoBound, NoiseFreeSamplesAreThoseOfTheSimulator) {
+  sim::ScenarioConfig c = small_scenario();
+  const auto [noisy, truth] = sim::simulate(c, {3, 0});
+  const std::vector<core::ImuSample> samples = noise_free_imu(noisy, truth);
+  c.imu.noise = {};
+  const auto [exact, same_truth] = sim::simulate(c, {3, 0});
+  ASSERT_EQ(samples.size(), exact.imu.size());
+  for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
+    const core::ImuBias& walked = truth.states[i].state.bias;
+    const core::ImuBias& constant = same_truth.states[i].state.bias;
+    const Eigen::Vector3d rate = exact.imu[i].gyro_rad_s - constant.gyro_rad_s + walked.gyro_rad_s;
+    const Eigen::Vector3d accel = exact.imu[i].accel_m_s2 - constant.accel_m_s2 + walked.accel_m_s2;
+    EXPECT_LT((samples[i].gyro_rad_s - rate).norm(), 1e-3) << i;
+    EXPECT_LT((samples[i].accel_m_s2 - accel).norm(), 2e-2) << i;
+  }
+}
+
+// A rig at rest says nothing of td, readout and extrinsics, and neither does its noise.
+TEST(CramerRaoBound, RestLeavesThePriors) {
+  sim::ScenarioConfig c = small_scenario();
+  c.duration_s = 4.0;
+  c.trajectory.type = sim::TrajectoryType::kStatic;
+  const auto [log, truth] = sim::simulate(c, {3, 0});
+  const core::PosteriorCovariance P = cramer_rao_bound(log, truth, {.frames = every_second_frame(log)}).covariance;
+  const core::CalibrationSigmas& prior = log.prior.calibration_sigma;
+  EXPECT_NEAR(std::sqrt(P(core::kCovTd, core::kCovTd)), prior.td_s, 1e-3 * prior.td_s);
+  EXPECT_NEAR(std::sqrt(P(core::kCovReadout, core::kCovReadout)), prior.readout_s, 1e-3 * prior.readout_s);
+  EXPECT_NEAR(std::sqrt(P(0, 0)), prior.extrinsic_position_m, 1e-3 * prior.extrinsic_position_m);
 }
 
 // Anchored landmarks of weak parallax and the estimator's normal equations leave fewer digits.

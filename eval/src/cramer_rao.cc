@@ -51,7 +51,7 @@ struct TrackInfo {
 class Builder {
  public:
   Builder(const core::MeasurementLog& log, const sim::GroundTruth& truth, const BoundOptions& options)
-      : log_(log), truth_(truth), options_(options) {
+      : log_(log), truth_(truth), options_(options), imu_(noise_free_imu(log, truth)) {
     const std::array<bool, kCalibrationDof> is_free = {options.extrinsics, options.extrinsics, options.extrinsics,
                                                        options.extrinsics, options.extrinsics, options.extrinsics,
                                                        options.td,         options.readout};
@@ -109,7 +109,7 @@ class Builder {
     for (std::size_t k = 0; k < options_.frames.size(); ++k) {
       const core::Frame& frame = log_.frames[options_.frames[k]];
       const core::State& x = state(k + 1);
-      const auto motion = std::make_shared<LocalMotion>(log_.imu, samples_[k + 1], reach_s, x.bias);
+      const auto motion = std::make_shared<LocalMotion>(imu_, samples_[k + 1], reach_s, x.bias);
       const estimator::FrameTiming timing{motion, core::to_seconds(frame.t_cam_ns - stamp(k + 1))};
       for (const core::PointObservation& point : frame.points) {
         const auto landmark = truth_.track_landmark.find(point.track_id);
@@ -163,7 +163,7 @@ class Builder {
   }
 
   void add_inertial(std::size_t i) {
-    const std::span<const core::ImuSample> all(log_.imu);
+    const std::span<const core::ImuSample> all(imu_);
     const auto samples = all.subspan(samples_[i], samples_[i + 1] - samples_[i] + 1);
     const estimator::ImuFactor factor(estimator::preintegrate(samples, state(i).bias, log_.imu_noise),
                                       log_.gravity_m_s2);
@@ -289,6 +289,7 @@ class Builder {
   const core::MeasurementLog& log_;
   const sim::GroundTruth& truth_;
   const BoundOptions& options_;
+  std::vector<core::ImuSample> imu_;
   std::vector<int> free_;                               // rows of the calibration that are free
   std::vector<std::size_t> samples_;                    // of the states, in the log
   std::vector<core::State> true_states_;                // there
@@ -307,6 +308,27 @@ class Builder {
 };
 
 }  // namespace
+
+std::vector<core::ImuSample> noise_free_imu(const core::MeasurementLog& log, const sim::GroundTruth& truth) {
+  const Eigen::Vector3d gravity_W(0.0, 0.0, -log.gravity_m_s2);
+  std::vector<core::ImuSample> samples;
+  samples.reserve(log.imu.size());
+  for (const core::ImuSample& measured : log.imu) {
+    const auto at = std::lower_bound(truth.states.begin(), truth.states.end(), measured.t_ns,
+                                     [](const core::StampedState& s, core::TimeNs t) { return s.t_ns < t; });
+    if (at == truth.states.end()) throw std::domain_error("an IMU sample lies outside the truth");
+    const auto before = at == truth.states.begin() ? at : at - 1;
+    const auto after = at + 1 == truth.states.end() ? at : at + 1;
+    const double dt_s = core::to_seconds(after->t_ns - before->t_ns);
+    const Eigen::Quaterniond turn = before->state.T_W_B.q.conjugate() * after->state.T_W_B.q;
+    const Eigen::Vector3d accel_W = (after->state.v_W - before->state.v_W) / dt_s;
+    const core::ImuBias& bias = at->state.bias;
+    samples.push_back({.t_ns = measured.t_ns,
+                       .gyro_rad_s = core::log_so3(turn) / dt_s + bias.gyro_rad_s,
+                       .accel_m_s2 = at->state.T_W_B.q.conjugate() * (accel_W - gravity_W) + bias.accel_m_s2});
+  }
+  return samples;
+}
 
 CramerRaoBound cramer_rao_bound(const core::MeasurementLog& log, const sim::GroundTruth& truth,
                                 const BoundOptions& options) {

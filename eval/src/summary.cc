@@ -168,7 +168,7 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
     has_nees = has_nees || !nees.empty();
     has_bound = has_bound || metric.bound.has_value();
   }
-  if (all_ok) cell.nis = summarise_nis(ok);
+  if (all_ok && has_nees) cell.nis = summarise_nis(ok);
   if (!all_ok && (has_nees || has_bound)) {
     cell.note = fmt::format("no NEES or efficiency is claimed: {} of {} trials failed", cell.n - cell.n_ok, cell.n);
   } else if (has_bound && !short_gaps) {

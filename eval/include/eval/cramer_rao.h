@@ -2,9 +2,10 @@
 // a smaller covariance than
 //   Sigma = ( P0^-1 + sum_i J_i^T J_i )^-1
 // J_i the whitened Jacobians of all inertial and visual measurements at the true states, with the exact camera timing
-// (`propagated`), landmarks with three degrees of freedom and no prior. Rates and accelerations in them are those of
-// the samples, corrected by the true biases. Since priors are drawn as one more measurement, this is the classical
-// bound (Van Trees, 1968, section 2.4.2); the biases' walk is part of the measurement model.
+// (`propagated`), landmarks with three degrees of freedom and no prior. Rates and accelerations in them are the
+// true ones (noise_free_imu): with those of the noisy samples a rig at rest would seem to turn, and td to be seen.
+// Since priors are drawn as one more measurement, this is the classical bound (Van Trees, 1968, section 2.4.2); the
+// biases' walk is part of the measurement model.
 //
 // Landmarks are taken in world coordinates here, which any smooth choice of coordinates equals. Each track is a
 // landmark of its own, as to an estimator that does not recognise places. A direction in which no observation moves
@@ -51,6 +52,10 @@ struct BoundOptions {
   Alignment alignment = Alignment::kPosyaw;  // by all poses
   bool causal = false;
 };
+
+// What the IMU would have measured at the stamps of the log without white noise and defects, the true biases included:
+// central differences of the true orientations and velocities at the neighbouring stamps, exact to second order.
+std::vector<core::ImuSample> noise_free_imu(const core::MeasurementLog& log, const sim::GroundTruth& truth);
 
 // Needs positive noise densities and pixel noise. Throws std::domain_error where the information is singular.
 CramerRaoBound cramer_rao_bound(const core::MeasurementLog& log, const sim::GroundTruth& truth,

@@ -10,7 +10,8 @@
 //               a single parameter |e| <= 3 sigma; with Clopper and Pearson's interval. 0.9973 is expected.
 //   nis         sum of squared whitened residuals over all trials, a chi-square variable of sum(residuals - parameters)
 //               degrees of freedom where the noise is as the estimator believes; divided by these, with its 95 % band
-// A NEES or NIS is claimed only where every trial is ok: those that fail would have been the worst.
+// A NEES, NIS or efficiency is claimed only where every trial is ok: those that fail would have been the worst. No NIS
+// where there is no NEES at all, as with exact prior means.
 #pragma once
 
 #include <optional>
