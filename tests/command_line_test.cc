@@ -194,7 +194,7 @@ TEST_F(CommandLine, BadInputIsOneLineExitTwoAndNothingWritten) {
       {"run quaternion.yaml", "quaternion.yaml:3: scenario.camera.extrinsic_rotation_xyzw: must be a unit quaternion"},
       {"run include.yaml", "include.yaml:1: scenario: no such file"},
       {"run axis.yaml", "axis.yaml:3: experiment.axes.scenario.camera.td_s: must be a list"},
-      {"run noise.yaml", "estimator.imu.gyro_noise_density_rad_s_sqrt_hz: must be > 0"},
+      {"run noise.yaml", "estimator.imu.gyro_noise_density_rad_s_sqrt_hz: must be >= 1e-12"},
       {"run spline.yaml", "poses.txt"},
       {"run small.yaml --set scenario.camera.td=1", "--set scenario.camera.td=1: unknown key; did you mean 'td_s'?"},
       {"run small.yaml --set estimator.type=magic", "--set estimator.type=magic"},

@@ -10,6 +10,7 @@
 #include "core/hash.h"
 #include "core/resolved_config.h"
 #include "estimator/estimate.h"
+#include "sim/imu_sensor.h"
 #include "sim/trajectory.h"
 #include "sim/world.h"
 
@@ -165,8 +166,15 @@ void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_
   }
 }
 
-// What only shows when a cell's parts meet: noise the estimator cannot work with, pose files that are too short, worlds
-// without room for the path.
+// What only shows when a scenario's parts meet: pose files that are too short, worlds without room for the path, motion
+// that no IMU could follow.
+void check_scenario(const sim::ScenarioConfig& scenario, core::TrialId id) {
+  const auto trajectory = sim::make_trajectory(scenario.trajectory, scenario.duration_s, id);
+  sim::make_world(scenario, *trajectory, id);
+  sim::simulate_imu(*trajectory, scenario.imu, scenario.gravity_m_s2, scenario.duration_s, id);
+}
+
+// Likewise a cell's: noise the estimator cannot work with.
 void check_cell(const Experiment& e) {
   estimator::require_usable(
       estimator::believed_noise(e.estimator, e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px),
@@ -179,9 +187,7 @@ void check_cell(const Experiment& e) {
     estimator::require_usable({e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px},
                               e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
   }
-  const core::TrialId id{e.experiment.seed, 0};
-  const auto trajectory = sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, id);
-  sim::make_world(e.scenario, *trajectory, id);
+  check_scenario(e.scenario, {e.experiment.seed, 0});
 }
 
 Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std::string& default_name) {
@@ -250,7 +256,7 @@ Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>
 
 sim::ScenarioConfig load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
   const Experiment experiment = read_experiment(apply_overrides(wrap(file, "scenario"), overrides, nullptr));
-  sim::make_trajectory(experiment.scenario.trajectory, experiment.scenario.duration_s, {});
+  check_scenario(experiment.scenario, {});
   return experiment.scenario;
 }
 
