@@ -238,6 +238,17 @@ ConfigTree wrap(const std::filesystem::path& file, const std::string& key) {
   return root;
 }
 
+// How many keys of the tree, with all below them, are documented.
+int known_keys(const ConfigTree& tree, const std::string& prefix, const std::vector<core::KeyDoc>& docs) {
+  int count = 0;
+  for (const ConfigEntry& entry : tree.entries) {
+    const std::string key = prefix + entry.key;
+    if (std::any_of(docs.begin(), docs.end(), [&](const core::KeyDoc& doc) { return doc.key == key; })) ++count;
+    count += known_keys(entry.value, key + ".", docs);
+  }
+  return count;
+}
+
 }  // namespace
 
 std::string run_id(const Cell& cell, int trial) {
@@ -317,22 +328,23 @@ Plan read_manifest(const std::filesystem::path& file) {
   return plan;
 }
 
-ConfigKind config_kind(const std::filesystem::path& file) {
+std::vector<ConfigKind> config_kinds(const std::filesystem::path& file) {
   const ConfigTree root = core::load_config_file(file);
   require_map(root, "");
-  const auto has_any = [&](std::span<const std::string_view> keys) {
-    return std::any_of(root.entries.begin(), root.entries.end(),
-                       [&](const ConfigEntry& e) { return std::find(keys.begin(), keys.end(), e.key) != keys.end(); });
-  };
   constexpr std::array<std::string_view, 5> kExperimentKeys = {"experiment", "scenario", "estimator", "eval", "set"};
-  constexpr std::array<std::string_view, 8> kScenarioKeys = {"duration_s", "gravity_m_s2", "trajectory", "camera",
-                                                             "world",      "points",       "prior",      "imu"};
-  constexpr std::array<std::string_view, 7> kEstimatorKeys = {"type",     "timing", "residual",        "landmark",
-                                                              "estimate", "solver", "keyframe_rate_hz"};
-  if (has_any(kExperimentKeys)) return ConfigKind::kExperiment;
-  if (has_any(kEstimatorKeys)) return ConfigKind::kEstimator;
-  if (has_any(kScenarioKeys)) return ConfigKind::kScenario;
-  throw core::config_error(root.origin, "", "is neither an experiment nor a scenario nor an estimator");
+  const bool is_experiment = std::any_of(root.entries.begin(), root.entries.end(), [&](const ConfigEntry& e) {
+    return std::find(kExperimentKeys.begin(), kExperimentKeys.end(), e.key) != kExperimentKeys.end();
+  });
+  if (is_experiment) return {ConfigKind::kExperiment};
+  const int of_scenario = known_keys(root, "", core::document_config(sim::ScenarioConfig{}, ""));
+  const int of_estimator = known_keys(root, "", core::document_config(estimator::EstimatorConfig{}, ""));
+  if (of_scenario == 0 && of_estimator == 0) {
+    throw core::config_error(root.origin, "", "is neither an experiment nor a scenario nor an estimator");
+  }
+  std::vector<ConfigKind> kinds;
+  if (of_scenario >= of_estimator) kinds.push_back(ConfigKind::kScenario);
+  if (of_estimator >= of_scenario) kinds.push_back(ConfigKind::kEstimator);
+  return kinds;
 }
 
 }  // namespace plumbline::tools
