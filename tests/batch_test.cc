@@ -1,5 +1,6 @@
 // The batch estimator on simulated recordings: the model's own error, conventions, blindness, outcomes.
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -258,6 +259,54 @@ TEST(Batch, NoFramesIsAFailedInitialisation) {
   const core::EstimateLog estimate = estimator::estimate(s.measurements, {});
   EXPECT_EQ(estimate.status, core::SolveStatus::kFailedInitialisation);
   EXPECT_FALSE(estimate.reason.empty());
+}
+
+// Whatever leaves two states at one IMU sample: the reason names the keyframe.
+TEST(Batch, StatesWithoutMotionBetweenThemAreAFailedInitialisation) {
+  const auto s = sim::simulate(scenario(), {1, 0});
+  const auto reason = [](const core::MeasurementLog& log, const estimator::EstimatorConfig& config) {
+    const core::EstimateLog estimate = estimator::estimate(log, config);
+    EXPECT_EQ(estimate.status, core::SolveStatus::kFailedInitialisation);
+    EXPECT_TRUE(estimate.states.empty());
+    return estimate.reason;
+  };
+  core::MeasurementLog cut_short = s.measurements;
+  cut_short.imu.resize(cut_short.imu.size() / 2);
+  EXPECT_NE(reason(cut_short, {}).find("keyframe 2"), std::string::npos);
+  core::MeasurementLog early = s.measurements;
+  early.prior.start_calibration.td_s = -0.4;
+  EXPECT_NE(reason(early, {}).find("keyframe 0"), std::string::npos);
+  estimator::EstimatorConfig far;
+  far.state_td_s = 6.0;
+  EXPECT_NE(reason(s.measurements, far).find("keyframe 1"), std::string::npos);
+  core::MeasurementLog late_prior = s.measurements;
+  late_prior.prior.t_ns = late_prior.imu[late_prior.imu.size() / 2].t_ns;
+  EXPECT_NE(reason(late_prior, {}).find("keyframe 0"), std::string::npos);
+
+  sim::ScenarioConfig slow = scenario();
+  slow.imu.rate_hz = 12.0;
+  estimator::EstimatorConfig fast;
+  fast.keyframe_rate_hz = 20.0;
+  EXPECT_NE(reason(sim::simulate(slow, {1, 0}).measurements, fast).find("keyframe"), std::string::npos);
+}
+
+// The IMU alone is no answer, however well its residuals fit.
+TEST(Batch, NoObservationIsAFailedInitialisation) {
+  auto s = sim::simulate(scenario(), {1, 0});
+  for (core::Frame& frame : s.measurements.frames) frame.points.clear();
+  const core::EstimateLog estimate = estimator::estimate(s.measurements, {});
+  EXPECT_EQ(estimate.status, core::SolveStatus::kFailedInitialisation);
+  EXPECT_EQ(estimate.reason, "no observation could be used");
+}
+
+// Ceres has not one iteration to tell of where the first evaluation fails.
+TEST(Batch, AStartThatCannotBeEvaluatedIsAStatus) {
+  auto s = sim::simulate(scenario(), {1, 0});
+  s.measurements.prior.start.v_W.x() = std::numeric_limits<double>::infinity();
+  const core::EstimateLog estimate = estimator::estimate(s.measurements, {});
+  EXPECT_EQ(estimate.status, core::SolveStatus::kFailedInitialisation);
+  EXPECT_FALSE(estimate.reason.empty());
+  EXPECT_EQ(estimate.summary.iterations, 0);
 }
 
 TEST(Batch, RefusesNoiseAndPriorsWithoutWidth) {

@@ -2,11 +2,11 @@
 #include "estimator/bundle_adjustment.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 
 #include <gtest/gtest.h>
 
+#include "data_folder.h"
 #include "eval/alignment.h"
 #include "sim/bal_world.h"
 
@@ -120,11 +120,8 @@ TEST(BundleAdjustment, APointInTheCamerasPlaneIsAnOutcome) {
 
 // 16 cameras and 22,106 points of Dubrovnik. The figures are those of Ceres' own example with automatic derivatives.
 TEST(BundleAdjustment, PublishedProblem) {
-  const char* data = std::getenv("PLUMBLINE_DATA");
-  const std::filesystem::path folder =
-      data != nullptr ? std::filesystem::path(data) : std::filesystem::path(PLUMBLINE_SOURCE_DIR) / "../shared/data";
-  const std::filesystem::path file = folder / "bal/problem-16-22106-pre.txt";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is absent; PLUMBLINE_DATA names the folder of bal/";
+  const std::filesystem::path file = data_folder() / "bal/problem-16-22106-pre.txt";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is absent (PLUMBLINE_DATA)";
   const core::BalProblem problem = core::read_bal(file);
   EXPECT_EQ(problem.cameras.size(), 16U);
   EXPECT_EQ(problem.points.size(), 22106U);

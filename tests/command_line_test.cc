@@ -228,7 +228,7 @@ TEST_F(CommandLine, BadInputIsOneLineExitTwoAndNothingWritten) {
       {"run quaternion.yaml", "quaternion.yaml:3: scenario.camera.extrinsic_rotation_xyzw: must be a unit quaternion"},
       {"run include.yaml", "include.yaml:1: scenario: no such file"},
       {"run axis.yaml", "axis.yaml:3: experiment.axes.scenario.camera.td_s: must be a list"},
-      {"run noise.yaml", "estimator.imu.gyro_noise_density_rad_s_sqrt_hz: must be > 0"},
+      {"run noise.yaml", "estimator.imu.gyro_noise_density_rad_s_sqrt_hz: must be >= 1e-12"},
       {"run spline.yaml", "poses.txt"},
       {"run small.yaml --set scenario.camera.td=1", "--set scenario.camera.td=1: unknown key; did you mean 'td_s'?"},
       {"run small.yaml --set estimator.type=magic", "--set estimator.type=magic"},
@@ -488,10 +488,44 @@ TEST_F(CommandLine, CheckTellsWhatAFileIs) {
       }
       const Result result = plumbline(arguments);
       EXPECT_EQ(result.code, 0) << result.err;
-      EXPECT_THAT(result.out, HasSubstr(std::string(kind).substr(0, std::string(kind).size() - 1)));
+      EXPECT_THAT(result.out, HasSubstr(": " + std::string(kind).substr(0, std::string(kind).size() - 1)));
     }
   }
   EXPECT_EQ(plumbline("check small.yaml --set scenario.camera.rate_hz=0").code, 2);
+}
+
+// By whatever keys a file has, also where few or both kinds have them.
+TEST_F(CommandLine, CheckTellsScenariosFromEstimators) {
+  struct Case {
+    const char* text;
+    const char* kind;
+  };
+  for (const auto& [text, kind] : {Case{"pixel_sigma_px: 2\n", "estimator"}, Case{"state_td_s: 0\n", "estimator"},
+                                   Case{"max_iterations: 9\nimu: {gyro_noise_density_rad_s_sqrt_hz: 1}\n", "estimator"},
+                                   Case{"imu: {rate_hz: 100}\n", "scenario"}, Case{"prior: {}\n", "scenario"},
+                                   Case{"imu: {gyro_noise_density_rad_s_sqrt_hz: 1}\n", "scenario or estimator"},
+                                   Case{"imu: {gyro_noise_density_rad_s_sqrt_hz: 0}\n", "scenario"}}) {
+    write("some.yaml", text);
+    const Result result = plumbline("check some.yaml");
+    EXPECT_EQ(result.code, 0) << result.err;
+    EXPECT_EQ(result.out, std::string("some.yaml: ") + kind + "\n") << text;
+  }
+  write("some.yaml", "imu: {gyro_noise_density_rad_s_sqrt_hz: -1}\n");
+  EXPECT_EQ(plumbline("check some.yaml").code, 2);
+  write("some.yaml", "colour: blue\n");
+  EXPECT_THAT(plumbline("check some.yaml").err, HasSubstr("some.yaml:1: is neither"));
+}
+
+// A scenario's world is built, as an experiment's is.
+TEST_F(CommandLine, CheckBuildsTheWorld) {
+  write("walls.yaml", "duration_s: 3\nworld: {type: rooms, rooms: {margin_m: 1e4}}\n");
+  EXPECT_EQ(plumbline("check walls.yaml").code, 2);
+}
+
+TEST_F(CommandLine, CheckNeedsAFileOrKeys) {
+  EXPECT_EQ(plumbline("check").code, 2);
+  EXPECT_EQ(plumbline("check --set scenario.duration_s=3").code, 2);
+  EXPECT_EQ(plumbline("check --keys").code, 0);
 }
 
 // configs/README.md holds the table that the program prints.

@@ -27,8 +27,8 @@ sim::ScenarioConfig scenario() {
   return c;
 }
 
-// Every trajectory of the simulator: a second of dead reckoning from the true state ends at the true state, up to the
-// midpoint rule's error, which a doubled rate divides by four.
+// Handheld motion and two loops (scenarios_test has the others): a second of dead reckoning from the true state ends at
+// the true state, up to the midpoint rule's error, which a doubled rate divides by four.
 TEST(Consistency, IntegratedImuReproducesTheTrajectoryAtSecondOrder) {
   for (const auto type :
        {sim::TrajectoryType::kHandheld, sim::TrajectoryType::kFigureEight, sim::TrajectoryType::kCircle}) {

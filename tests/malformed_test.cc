@@ -41,6 +41,7 @@ struct Case {
   fs::path file;          // that is written first, replacing a sound one
   std::string text;
   std::vector<std::string> says;  // parts of the message
+  std::string replaces = {};      // what of a sound file `text` is written for; all of it where empty
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -76,7 +77,14 @@ fs::path* Malformed::sound_ = nullptr;
 
 TEST_P(Malformed, OneLineCodeTwoNothingWritten) {
   const Case& c = GetParam();
-  if (!c.file.empty()) write(c.file, c.text);
+  if (!c.replaces.empty()) {
+    std::string text = read(folder_ / c.file);
+    const std::size_t at = text.find(c.replaces);
+    ASSERT_NE(at, std::string::npos) << c.replaces;
+    write(c.file, text.replace(at, c.replaces.size(), c.text));
+  } else if (!c.file.empty()) {
+    write(c.file, c.text);
+  }
   const std::vector<std::string> before = sizes(folder_);
   const ProgramResult result = plumbline(c.arguments);
   const std::string& message = result.err;
@@ -93,6 +101,11 @@ Case scenario(std::string name, std::string text, std::vector<std::string> says)
   return {std::move(name), "simulate x.yaml --out out", "x.yaml", std::move(text), std::move(says)};
 }
 
+// Likewise, where the parts of the scenario do not go together: no line is to blame.
+Case impossible(std::string name, std::string text, std::vector<std::string> says) {
+  return {std::move(name), "simulate x.yaml --out out", "x.yaml", std::move(text), std::move(says)};
+}
+
 // An experiment in x.yaml that is to be run.
 Case experiment(std::string name, std::string text, std::vector<std::string> says) {
   says.insert(says.begin(), "x.yaml");
@@ -106,6 +119,17 @@ Case command(std::string name, std::string arguments, std::vector<std::string> s
 Case poses(std::string name, std::string text, std::vector<std::string> says) {
   says.insert(says.begin(), "poses.tum");
   return {std::move(name), "simulate spline.yaml --out out", "poses.tum", std::move(text), std::move(says)};
+}
+
+// A dataset in which the first occurrence of `from` in one of its files becomes `to`.
+Case edited(std::string name, std::string file, std::string from, std::string to, std::vector<std::string> says) {
+  says.insert(says.begin(), file);
+  return {.name = std::move(name),
+          .arguments = "estimate data --out out",
+          .file = fs::path("data") / file,
+          .text = std::move(to),
+          .says = std::move(says),
+          .replaces = std::move(from)};
 }
 
 // A dataset of which one file is replaced.
@@ -138,7 +162,7 @@ std::vector<Case> keys_and_values() {
       scenario("Overflow", "gravity_m_s2: 1e999\n", {":1:", "gravity_m_s2"}),
       scenario("TooLarge", "camera: {td_s: 2}\n", {":1:", "camera.td_s", "[-1, 1]"}),
       scenario("TooSmall", "duration_s: 0\n", {":1:", "duration_s"}),
-      scenario("Negative", "camera:\n  fx_px: -460\n", {":2:", "camera.fx_px", "> 0"}),
+      scenario("Negative", "camera:\n  fx_px: -460\n", {":2:", "camera.fx_px", "[0.001, "}),
       scenario("ShortList", "imu: {gyro_bias_rad_s: [0, 0]}\n", {":1:", "imu.gyro_bias_rad_s", "3 numbers, got 2"}),
       scenario("LongList", "imu: {gyro_bias_rad_s: [0, 0, 0, 0]}\n", {":1:", "got 4"}),
       scenario("TextInList", "imu: {gyro_bias_rad_s: [0, x, 0]}\n", {":1:", "imu.gyro_bias_rad_s[1]"}),
@@ -163,6 +187,41 @@ std::vector<Case> keys_and_values() {
       scenario("SplineFileIsAFolder", "trajectory: {type: spline, file: data}\n", {":1:", "trajectory.file", "data"}),
       scenario("LongKey", repeat("k", 100000) + ": 1\n", {":1:"}),
       scenario("LongValue", std::string("duration_s: ") + repeat("9", 100000) + "x\n", {":1:", "duration_s"}),
+  };
+}
+
+// Values that are sound by their form, and would overflow or never end.
+std::vector<Case> beyond_physics() {
+  return {
+      scenario("Gravity", "gravity_m_s2: 1e200\n", {":1:", "gravity_m_s2", "[0, 1000]"}),
+      scenario("Rate", "trajectory: {handheld: {rate_rms_rad_s: 1e160}}\n", {":1:", "handheld.rate_rms_rad_s"}),
+      scenario("OrientationSigma", "prior: {orientation_sigma_rad: 1e200}\n", {":1:", "prior.orientation_sigma_rad"}),
+      scenario("TinySigma", "prior: {position_sigma_m: 1e-200}\n", {":1:", "prior.position_sigma_m", "1e-12"}),
+      impossible("Margin", "world: {type: rooms, rooms: {margin_m: 1e4}}\n", {"rooms.longest_side_m", "larger"}),
+      scenario("Clearance", "world: {type: rooms, walls: {clearance_m: 1e9}}\n", {":1:", "walls.clearance_m"}),
+      scenario("Radius", "trajectory: {type: circle, loop: {radius_m: 1e300}}\n", {":1:", "loop.radius_m"}),
+      impossible("TooFast", "trajectory: {type: circle, loop: {radius_m: 1e4, period_s: 0.01}}\n",
+                 {"scenario.trajectory", "slower"}),
+      impossible("PathToNowhere",
+                 "duration_s: 3600\nimu: {rate_hz: 10}\nworld: {type: corridor}\n"
+                 "trajectory: {type: constant_acceleration, constant: {acceleration_m_s2: [1e4, 0, 0]}}\n",
+                 {"scenario.trajectory", "within"}),
+      impossible("LensWithoutRays",
+                 "world: {type: frustum}\ncamera: {distortion: radtan, distortion_coefficients: [-1e6, 0, 0, 0]}\n",
+                 {"distortion_coefficients", "weaker"}),
+      scenario("NoiseDensity", "imu: {gyro_noise_density_rad_s_sqrt_hz: 1e200}\n", {":1:", "gyro_noise_density"}),
+      scenario("FocalLength", "camera: {fx_px: 1e-300}\n", {":1:", "camera.fx_px"}),
+      {"TinyNoise",
+       "run x.yaml --out out",
+       "x.yaml",
+       "scenario: scenario.yaml\nset: {scenario.imu.gyro_noise_density_rad_s_sqrt_hz: 1e-200}\n",
+       {"estimator.imu.gyro_noise_density_rad_s_sqrt_hz", "1e-12"}},
+      {"RunTooFast",
+       "run x.yaml --out out",
+       "x.yaml",
+       "scenario: scenario.yaml\n"
+       "set: {scenario.trajectory: {type: circle, loop: {radius_m: 1e4, period_s: 0.01}}}\n",
+       {"scenario.trajectory", "slower"}},
   };
 }
 
@@ -261,7 +320,19 @@ std::vector<Case> experiments() {
               {"--set scenario.duration_s=x", "number"}),
       command("SetBrokenYaml", "simulate scenario.yaml --out out --set 'scenario.imu={a: '", {"--set"}),
       command("OutIsNotEmpty", "simulate scenario.yaml --out data", {"data", "not an empty folder"}),
-      command("RunOutIsAFile", "run scenario.yaml --out poses.tum", {""}),
+      {"RunOutIsAFile",
+       "run x.yaml --out poses.tum",
+       "x.yaml",
+       sound + "experiment: {trials: 1}\n",
+       {"poses.tum", "is not a folder"}},
+      {"RunOutIsBelowAFile",
+       "run x.yaml --out poses.tum/a/b",
+       "x.yaml",
+       sound + "experiment: {trials: 1}\n",
+       {"poses.tum is not a folder"}},
+      command("SimulateOutIsBelowAFile", "simulate scenario.yaml --out poses.tum/x", {"poses.tum is not a folder"}),
+      command("EstimateOutIsBelowAFile", "estimate data --out poses.tum/x", {"poses.tum is not a folder"}),
+      command("SimulateBaOutIsBelowAFile", "simulate-ba --out poses.tum/x", {"poses.tum is not a folder"}),
       command("ReplayOfNothing", "replay nowhere abc", {"nowhere/manifest.json"}),
   };
 }
@@ -309,6 +380,17 @@ std::vector<Case> data_files() {
               "gyroscope_noise_density: -1\ngyroscope_random_walk: 1\naccelerometer_noise_density: "
               "1\naccelerometer_random_walk: 1\n",
               {":1:", "gyroscope_noise_density"}),
+      dataset("TrackTwiceInAFrame", "mav0/cam0/points.csv", "300000000,7,10,10\n300000000,7,11,10\n",
+              {":2:", "track 7"}),
+      edited("PriorAfterTheFirstFrame", "prior.yaml", "t_ns: 0", "t_ns: 500000000", {":1:", "t_ns", "first frame"}),
+      edited("ImuBeyondPhysics", "mav0/imu0/data.csv", "\n20000000,", "\n20000000,1e200,0,0,0,0,9.81\n20000001,",
+             {":3:", "rad/s"}),
+      {.name = "TinyNoiseDensity",
+       .arguments = "estimate data --out out",
+       .file = "data/mav0/imu0/sensor.yaml",
+       .text = "gyroscope_noise_density: 1e-200",
+       .says = {"gyro_noise_density", "1e-12"},
+       .replaces = "gyroscope_noise_density: 0.001"},
       command("NoEstimate", "evaluate nowhere.tum --truth poses.tum", {"nowhere.tum"}),
       command("NoTruth", "evaluate poses.tum --truth nowhere.tum", {"nowhere.tum"}),
       {"TruthUnsorted",
@@ -326,6 +408,7 @@ std::vector<Case> data_files() {
 
 std::string case_name(const ::testing::TestParamInfo<Case>& info) { return info.param.name; }
 INSTANTIATE_TEST_SUITE_P(KeysAndValues, Malformed, ::testing::ValuesIn(keys_and_values()), case_name);
+INSTANTIATE_TEST_SUITE_P(BeyondPhysics, Malformed, ::testing::ValuesIn(beyond_physics()), case_name);
 INSTANTIATE_TEST_SUITE_P(Syntax, Malformed, ::testing::ValuesIn(syntax()), case_name);
 INSTANTIATE_TEST_SUITE_P(Experiments, Malformed, ::testing::ValuesIn(experiments()), case_name);
 INSTANTIATE_TEST_SUITE_P(DataFiles, Malformed, ::testing::ValuesIn(data_files()), case_name);

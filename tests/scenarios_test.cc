@@ -1,16 +1,18 @@
 // Every scenario of configs/scenarios: it says what it is for, and simulates what it says.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "data_folder.h"
 #include "sim/frame_view.h"
 #include "sim/imu_sensor.h"
 #include "sim/simulate.h"
@@ -32,12 +34,7 @@ std::vector<fs::path> scenario_files() {
   return files;
 }
 
-fs::path recorded_poses() {
-  const char* named = std::getenv("PLUMBLINE_DATA");
-  const fs::path folder =
-      named != nullptr ? fs::path(named) : fs::path(PLUMBLINE_SOURCE_DIR) / "../shared/data/trajectories";
-  return folder / "euroc_V1_01_easy.txt";
-}
+fs::path recorded_poses() { return data_folder() / "trajectories/euroc_V1_01_easy.txt"; }
 
 std::string read(const fs::path& file) {
   std::ifstream in(file);
@@ -64,11 +61,12 @@ class Scenario : public testing::TestWithParam<fs::path> {
 };
 
 TEST_P(Scenario, OpensWithASentenceOnWhatItIsFor) {
-  const std::string text = read(GetParam());
-  EXPECT_TRUE(text.starts_with("# "));
-  const std::string comment = text.substr(0, text.find("\nduration_s"));
-  EXPECT_NE(comment.find('.'), std::string::npos);
-  EXPECT_GT(comment.size(), 40U);
+  std::istringstream lines(read(GetParam()));
+  std::string comment;  // as one line
+  for (std::string line; std::getline(lines, line) && line.starts_with("# ");) comment += line.substr(1);
+  ASSERT_GT(comment.size(), 40U);
+  EXPECT_TRUE(std::isupper(static_cast<unsigned char>(comment[1])) != 0) << comment;
+  EXPECT_TRUE(comment.ends_with('.')) << comment;
 }
 
 core::State integrated(const std::vector<core::ImuSample>& samples, std::size_t from, std::size_t to, core::State x,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -15,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/pose_file.h"
+#include "data_folder.h"
 #include "sim/handheld_motion.h"
 #include "sim/harmonic_trajectory.h"
 #include "sim/loop_motion.h"
@@ -532,13 +532,9 @@ TEST(Spline, LongestSegmentStepsAroundGaps) {
 
 // Motion capture at 120 Hz that lost the rig now and then.
 TEST(Spline, RecordedRoomHasGaps) {
-  const char* named = std::getenv("PLUMBLINE_DATA");
-  const std::filesystem::path folder =
-      named != nullptr ? std::filesystem::path(named)
-                       : std::filesystem::path(PLUMBLINE_SOURCE_DIR) / "../shared/data/trajectories";
   TrajectoryConfig config;
   config.type = TrajectoryType::kSpline;
-  config.file = folder / "tum_room1.txt";
+  config.file = data_folder() / "trajectories/tum_room1.txt";
   if (!std::filesystem::exists(config.file)) GTEST_SKIP() << config.file << " is absent (PLUMBLINE_DATA)";
   EXPECT_THROW(make_trajectory(config, 135.0, kId), core::DataError);
   config.on_gap = OnGap::kLongestSegment;

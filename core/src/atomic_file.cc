@@ -11,6 +11,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "core/error.h"
+
 namespace plumbline::core {
 namespace {
 
@@ -48,6 +50,18 @@ void publish_file(const fs::path& from, const fs::path& to) {
   sync(from, O_RDONLY);
   if (std::rename(from.c_str(), to.c_str()) != 0) fail(to, "rename to");
   sync(to.has_parent_path() ? to.parent_path() : fs::path("."), O_RDONLY | O_DIRECTORY);
+}
+
+void require_no_file_above(const fs::path& path) {
+  std::error_code none;
+  for (fs::path folder = path.parent_path(); !folder.empty(); folder = folder.parent_path()) {
+    const fs::file_status status = fs::status(folder, none);
+    if (fs::exists(status) && !fs::is_directory(status)) {
+      throw DataError(
+          fmt::format("{}: cannot be made, {} is not a folder", path.generic_string(), folder.generic_string()));
+    }
+    if (folder == folder.parent_path()) return;
+  }
 }
 
 void write_file_atomically(const fs::path& path, std::string_view text) {

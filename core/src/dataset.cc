@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "core/camera_config.h"
 #include "core/csv.h"
 #include "core/error.h"
+#include "core/physical_ranges.h"
 #include "core/resolved_config.h"
 
 namespace plumbline::core {
@@ -47,28 +49,29 @@ void visit(ConfigVisitor& v, MetaFile& c) {
   v.value("schema", c.schema, "version of this layout");
   v.value("stamp_clock", c.stamp_clock, "of the files of measurements");
   v.choice("td_reference_row", c.td_reference_row, kRowReferenceNames, "the row that every td speaks of");
-  v.value("gravity_m_s2", c.gravity_m_s2, non_negative(), "along -z of the world");
+  v.value("gravity_m_s2", c.gravity_m_s2, up_to(kMostGravityMS2), "along -z of the world");
   v.value("config_hash", c.config_hash, "of the scenario");
   v.value("seed", c.seed, any(), "of the experiment");
   v.value("trial", c.trial, any(), "of the draw");
 }
 
 void visit(ConfigVisitor& v, ImuSensorFile& c) {
-  v.value("gyroscope_noise_density", c.noise.gyro_noise_density, non_negative(), "rad/s/sqrt(Hz)");
-  v.value("gyroscope_random_walk", c.noise.gyro_bias_walk, non_negative(), "rad/s^2/sqrt(Hz)");
-  v.value("accelerometer_noise_density", c.noise.accel_noise_density, non_negative(), "m/s^2/sqrt(Hz)");
-  v.value("accelerometer_random_walk", c.noise.accel_bias_walk, non_negative(), "m/s^3/sqrt(Hz)");
+  const Range density = up_to(kMostNoiseDensity);
+  v.value("gyroscope_noise_density", c.noise.gyro_noise_density, density, "rad/s/sqrt(Hz)");
+  v.value("gyroscope_random_walk", c.noise.gyro_bias_walk, density, "rad/s^2/sqrt(Hz)");
+  v.value("accelerometer_noise_density", c.noise.accel_noise_density, density, "m/s^2/sqrt(Hz)");
+  v.value("accelerometer_random_walk", c.noise.accel_bias_walk, density, "m/s^3/sqrt(Hz)");
 }
 
 void visit(ConfigVisitor& v, CameraSensorFile& c) {
   visit(v, c.model);
-  v.value("pixel_sigma_px", c.pixel_sigma_px, non_negative(), "noise of u and v");
+  v.value("pixel_sigma_px", c.pixel_sigma_px, up_to(kMostPixels), "noise of u and v");
 }
 
 }  // namespace
 
 void visit(ConfigVisitor& v, Pose& c) {
-  v.value("position_m", c.p, any(), "origin of the inner frame in the outer");
+  v.value("position_m", c.p, within(kMostPathM), "origin of the inner frame in the outer");
   Eigen::Vector4d q = c.q.coeffs();
   v.value("quaternion_xyzw", q, between(-1.000001, 1.000001), "Hamilton, unit");
   c.q.coeffs() = q;
@@ -76,30 +79,30 @@ void visit(ConfigVisitor& v, Pose& c) {
 
 void visit(ConfigVisitor& v, RigCalibration& c) {
   v.section("T_B_C", c.T_B_C, "extrinsics");
-  v.value("td_s", c.td_s, any(), "middle row");
-  v.value("readout_s", c.readout_s, any(), "first row to last");
+  v.value("td_s", c.td_s, within(kMostTimeOffsetS), "middle row");
+  v.value("readout_s", c.readout_s, within(kMostTimeOffsetS), "first row to last");
 }
 
 static void visit(ConfigVisitor& v, State& c) {
   v.section("T_W_B", c.T_W_B, "pose");
-  v.value("velocity_m_s", c.v_W, any(), "world axes");
-  v.value("gyro_bias_rad_s", c.bias.gyro_rad_s, any(), "body axes");
-  v.value("accel_bias_m_s2", c.bias.accel_m_s2, any(), "body axes");
+  v.value("velocity_m_s", c.v_W, within(kMostPathM), "world axes");  // the longest path in a second
+  v.value("gyro_bias_rad_s", c.bias.gyro_rad_s, within(kMostGyroReadingRadS), "body axes");
+  v.value("accel_bias_m_s2", c.bias.accel_m_s2, within(kMostAccelReadingMS2), "body axes");
 }
 
 static void visit(ConfigVisitor& v, StateSigmas& c) {
-  v.value("position_m", c.position_m, positive(), "each axis");
-  v.value("orientation_rad", c.orientation_rad, positive(), "each axis");
-  v.value("velocity_m_s", c.velocity_m_s, positive(), "each axis");
-  v.value("gyro_bias_rad_s", c.gyro_bias_rad_s, positive(), "each axis");
-  v.value("accel_bias_m_s2", c.accel_bias_m_s2, positive(), "each axis");
+  v.value("position_m", c.position_m, sigma_up_to(kMostM), "each axis");
+  v.value("orientation_rad", c.orientation_rad, sigma_up_to(kMostAngleRad), "each axis");
+  v.value("velocity_m_s", c.velocity_m_s, sigma_up_to(kMostSpeedMS), "each axis");
+  v.value("gyro_bias_rad_s", c.gyro_bias_rad_s, sigma_up_to(kMostRateRadS), "each axis");
+  v.value("accel_bias_m_s2", c.accel_bias_m_s2, sigma_up_to(kMostAccelerationMS2), "each axis");
 }
 
 static void visit(ConfigVisitor& v, CalibrationSigmas& c) {
-  v.value("td_s", c.td_s, non_negative(), "middle row");
-  v.value("readout_s", c.readout_s, non_negative(), "first row to last");
-  v.value("extrinsic_position_m", c.extrinsic_position_m, non_negative(), "each axis");
-  v.value("extrinsic_rotation_rad", c.extrinsic_rotation_rad, non_negative(), "each axis");
+  v.value("td_s", c.td_s, up_to(kMostTimeOffsetSigmaS), "middle row");
+  v.value("readout_s", c.readout_s, up_to(kMostTimeOffsetSigmaS), "first row to last");
+  v.value("extrinsic_position_m", c.extrinsic_position_m, up_to(kMostM), "each axis");
+  v.value("extrinsic_rotation_rad", c.extrinsic_rotation_rad, up_to(kMostAngleRad), "each axis");
 }
 
 static void visit(ConfigVisitor& v, InitialPrior& c) {
@@ -143,12 +146,16 @@ void require_keys(const ConfigTree& tree, const nlohmann::ordered_json& resolved
 }
 
 template <class Config>
-Config read_yaml(const std::filesystem::path& file) {
+Config read_all_keys(const ConfigTree& tree) {
   Config config;
-  const ConfigTree tree = load_config_file(file);
   read_config(tree, "", config);
   require_keys(tree, resolved_config(config), "");
   return config;
+}
+
+template <class Config>
+Config read_yaml(const std::filesystem::path& file) {
+  return read_all_keys<Config>(load_config_file(file));
 }
 
 // Differences of stamps must not overflow.
@@ -159,22 +166,26 @@ void check_increasing(const CsvReader& csv, TimeNs previous, TimeNs now, bool fi
   if (!first && now <= previous) csv.fail(fmt::format("stamp {} does not come after {}", now, previous));
 }
 
-// What joins the prior with itself and with the IMU.
-void check_prior(const InitialPrior& prior, const std::vector<ImuSample>& imu, const std::string& file) {
-  const auto require_unit = [&](const Pose& pose, std::string_view key) {
-    if (std::abs(pose.q.norm() - 1.0) > 1e-3) {
-      throw DataError(fmt::format("{}: {}.quaternion_xyzw: must be a unit quaternion", file, key));
-    }
+// What joins the prior with itself, with the IMU and, by its td, with the frames.
+void check_prior(const MeasurementLog& log, const ConfigTree& tree) {
+  const InitialPrior& prior = log.prior;
+  const auto require = [&](bool holds, const std::string& key, std::string_view rule) {
+    if (!holds) throw config_error(find_value(tree, key)->origin, key, rule);
+  };
+  const auto require_unit = [&](const Pose& pose, const std::string& key) {
+    require(std::abs(pose.q.norm() - 1.0) <= 1e-3, key + ".quaternion_xyzw", "must be a unit quaternion");
   };
   require_unit(prior.mean.T_W_B, "mean.T_W_B");
   require_unit(prior.start.T_W_B, "start.T_W_B");
   require_unit(prior.calibration.T_B_C, "calibration.T_B_C");
   require_unit(prior.start_calibration.T_B_C, "start_calibration.T_B_C");
-  const auto sample = std::lower_bound(imu.begin(), imu.end(), prior.t_ns,
-                                       [](const ImuSample& s, TimeNs t_ns) { return s.t_ns < t_ns; });
-  if (sample == imu.end() || sample->t_ns != prior.t_ns) {
-    throw DataError(fmt::format("{}: t_ns: {} is not the stamp of an IMU sample", file, prior.t_ns));
-  }
+  require(std::binary_search(log.imu.begin(), log.imu.end(), ImuSample{.t_ns = prior.t_ns},
+                             [](const ImuSample& a, const ImuSample& b) { return a.t_ns < b.t_ns; }),
+          "t_ns", fmt::format("{} is not the stamp of an IMU sample", prior.t_ns));
+  if (log.frames.empty()) return;
+  const double lead_s = to_seconds(log.frames.front().t_cam_ns - prior.t_ns) + prior.calibration.td_s;
+  require(lead_s >= 0.0, "t_ns",
+          fmt::format("must not be after the first frame, which t_cam + td puts {} s before it", -lead_s));
 }
 
 }  // namespace
@@ -240,7 +251,8 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
   log.camera = camera.model;
   log.pixel_sigma_px = camera.pixel_sigma_px;
   log.imu_noise = read_yaml<ImuSensorFile>(folder / kImuSensor).noise;
-  log.prior = read_yaml<InitialPrior>(folder / "prior.yaml");
+  const ConfigTree prior = load_config_file(folder / "prior.yaml");
+  log.prior = read_all_keys<InitialPrior>(prior);
 
   CsvReader imu(folder / kImuFile, 7);
   while (imu.next()) {
@@ -248,25 +260,32 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
     check_increasing(imu, log.imu.empty() ? 0 : log.imu.back().t_ns, t_ns, log.imu.empty());
     log.imu.push_back(
         {t_ns, {imu.number(1), imu.number(2), imu.number(3)}, {imu.number(4), imu.number(5), imu.number(6)}});
+    if (!is_physical(log.imu.back())) {
+      imu.fail(fmt::format("no IMU reads more than {} rad/s or {} m/s^2", kMostGyroReadingRadS, kMostAccelReadingMS2));
+    }
   }
   if (log.imu.size() < 2) imu.fail("an IMU needs two samples");
-  check_prior(log.prior, log.imu, (folder / "prior.yaml").generic_string());
   CsvReader frames(folder / kFramesFile, 1);
   while (frames.next()) {
     const TimeNs t_ns = frames.integer(0);
     check_increasing(frames, log.frames.empty() ? 0 : log.frames.back().t_cam_ns, t_ns, log.frames.empty());
     log.frames.push_back({t_ns, {}});
   }
+  check_prior(log, prior);
   CsvReader points(folder / kPointsFile, 4, 2);
   auto frame = log.frames.begin();
+  std::set<std::int64_t> seen;  // the tracks of the frame
   while (points.next()) {
     const TimeNs t_ns = points.integer(0);
-    while (frame != log.frames.end() && frame->t_cam_ns < t_ns) ++frame;
+    for (; frame != log.frames.end() && frame->t_cam_ns < t_ns; ++frame) seen.clear();
     if (frame == log.frames.end() || frame->t_cam_ns != t_ns) {
       points.fail(fmt::format("frame {} is not in {}, or out of order", t_ns, kFramesFile));
     }
     core::PointObservation& point = frame->points.emplace_back();
     point.track_id = points.integer(1);
+    if (!seen.insert(point.track_id).second) {
+      points.fail(fmt::format("track {} is in frame {} already", point.track_id, t_ns));
+    }
     point.pixel = {points.number(2), points.number(3)};
     if (points.has(4) || points.has(5)) point.velocity = {points.number(4), points.number(5)};
   }

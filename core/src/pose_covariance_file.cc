@@ -14,7 +14,7 @@ namespace plumbline::core {
 namespace {
 
 constexpr std::size_t kPoseColumns = 8;
-constexpr std::size_t kColumns = kPoseColumns + 21;
+constexpr std::size_t kCovarianceColumns = kPoseColumns + 21;
 constexpr std::string_view kBlank = " \t\r\v\f";
 
 std::vector<std::string_view> words(std::string_view line) {
@@ -46,10 +46,10 @@ std::vector<PoseCovariance> parse_tum_covariances(std::string_view text, const s
     text.remove_prefix(std::min(line.size() + 1, text.size()));
     const std::vector<std::string_view> columns = words(line);
     if (columns.empty() || columns.front().starts_with('#')) continue;
-    if (covariances.empty() && columns.size() != kColumns) return {};
+    if (covariances.empty() && columns.size() != kCovarianceColumns) return {};
     const std::string where = fmt::format("{}:{}", name, number);
-    if (columns.size() != kColumns) {
-      throw DataError(fmt::format("{}: {} columns after lines of {}", where, columns.size(), kColumns));
+    if (columns.size() != kCovarianceColumns) {
+      throw DataError(fmt::format("{}: {} columns after lines of {}", where, columns.size(), kCovarianceColumns));
     }
     PoseCovariance& P = covariances.emplace_back();
     std::size_t column = kPoseColumns;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -28,13 +29,24 @@ std::size_t nearest_sample(const std::vector<core::ImuSample>& imu, double t_s, 
   return static_cast<std::size_t>(after - imu.begin()) - (earlier ? 1 : 0);
 }
 
+// No estimate where there is no starting point; what() is the reason.
+class NoStart : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 // Puts the states of the first `keyframes` keyframes at the samples nearest to t_cam + td, carried there by the IMU:
-// those that exist from where they were, new ones from the one before.
+// those that exist from where they were, new ones from the one before. Between two states there must be motion.
 void place_states(const BatchInput& input, std::size_t keyframes, double td_s, BatchValues& values) {
   const std::vector<core::ImuSample>& imu = input.log.imu;
   for (std::size_t k = 0; k < keyframes; ++k) {
     const core::TimeNs t_cam_ns = input.log.frames[input.keyframes[k]].t_cam_ns;
     const std::size_t sample = nearest_sample(imu, td_s, t_cam_ns);
+    if (sample <= values.samples[k]) {
+      throw NoStart(fmt::format(
+          "keyframe {}, stamped {} ns: with td = {:.6g} s no IMU sample is left for its state after that at {} ns", k,
+          t_cam_ns, td_s, imu[values.samples[k]].t_ns));
+    }
     const std::size_t i = k + 1;
     if (i == values.states.size()) {
       values.states.push_back(carry(values.states[k], imu, values.samples[k], sample, input.log.gravity_m_s2));
@@ -121,23 +133,9 @@ core::EstimateLog failed(std::string reason) {
   return log;
 }
 
-}  // namespace
-
-core::EstimateLog estimate_batch(const core::MeasurementLog& log, const EstimatorConfig& config) {
-  BatchInput input{.log = log,
-                   .config = config,
-                   .noise = believed_noise(config, log.imu_noise, log.pixel_sigma_px),
-                   .keyframes = {},
-                   .tracks = {}};
-  input.keyframes = select_keyframes(log.frames, config.keyframe_rate_hz);
-  input.tracks = collect_tracks(log.frames, input.keyframes, log.camera);
-  if (config.timing == TimingModel::kFeatureVelocity && drop_without_velocity(input.tracks) > 0 &&
-      input.tracks.empty()) {
-    return failed("no track has the image velocities that estimator.timing = feature_velocity needs");
-  }
-  if (input.keyframes.size() < 2) return failed("fewer than two keyframes");
-  if (log.imu.size() < 2 || log.imu.front().t_ns > log.prior.t_ns) return failed("no IMU samples at the prior's time");
-
+core::EstimateLog grow_and_refine(const BatchInput& input) {
+  const core::MeasurementLog& log = input.log;
+  const EstimatorConfig& config = input.config;
   BatchValues values;
   values.calibration = log.prior.start_calibration;
   values.states = {log.prior.start};
@@ -179,7 +177,10 @@ core::EstimateLog estimate_batch(const core::MeasurementLog& log, const Estimato
     }
 
     values = solved;
-    if (result.status == core::SolveStatus::kConverged && false_minimum(input, outcome.summary)) {
+    if (outcome.summary.observations == 0) {
+      result.status = core::SolveStatus::kFailedInitialisation;
+      result.reason = "no observation could be used";
+    } else if (result.status == core::SolveStatus::kConverged && false_minimum(input, outcome.summary)) {
       result.status = core::SolveStatus::kFalseMinimum;
       result.reason = fmt::format("final cost {:.3g} per degree of freedom, above estimator.max_cost_per_dof = {}",
                                   outcome.summary.cost_per_dof(), config.max_cost_per_dof);
@@ -204,6 +205,29 @@ core::EstimateLog estimate_batch(const core::MeasurementLog& log, const Estimato
     result.states.push_back({log.imu[values.samples[i]].t_ns, values.states[i]});
   }
   return result;
+}
+
+}  // namespace
+
+core::EstimateLog estimate_batch(const core::MeasurementLog& log, const EstimatorConfig& config) {
+  BatchInput input{.log = log,
+                   .config = config,
+                   .noise = believed_noise(config, log.imu_noise, log.pixel_sigma_px),
+                   .keyframes = {},
+                   .tracks = {}};
+  input.keyframes = select_keyframes(log.frames, config.keyframe_rate_hz);
+  input.tracks = collect_tracks(log.frames, input.keyframes, log.camera);
+  if (config.timing == TimingModel::kFeatureVelocity && drop_without_velocity(input.tracks) > 0 &&
+      input.tracks.empty()) {
+    return failed("no track has the image velocities that estimator.timing = feature_velocity needs");
+  }
+  if (input.keyframes.size() < 2) return failed("fewer than two keyframes");
+  if (log.imu.size() < 2 || log.imu.front().t_ns > log.prior.t_ns) return failed("no IMU samples at the prior's time");
+  try {
+    return grow_and_refine(input);
+  } catch (const NoStart& reason) {
+    return failed(reason.what());
+  }
 }
 
 }  // namespace plumbline::estimator

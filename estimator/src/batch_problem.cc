@@ -183,7 +183,7 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
     default:
       outcome.status = core::SolveStatus::kDiverged;
   }
-  outcome.summary = {.iterations = static_cast<int>(ceres_summary.iterations.size()) - 1,
+  outcome.summary = {.iterations = std::max(0, static_cast<int>(ceres_summary.iterations.size()) - 1),
                      .initial_cost = ceres_summary.initial_cost,
                      .final_cost = ceres_summary.final_cost,
                      .residuals = ceres_summary.num_residuals_reduced,

@@ -1,16 +1,19 @@
 #include "estimator/config.h"
 
+#include "core/physical_ranges.h"
+
 namespace plumbline::estimator {
 
-using core::positive;
+using core::sigma_up_to;
 
 // Argument-dependent lookup finds these; it does not look into an unnamed namespace.
 static void visit(core::ConfigVisitor& v, ImuNoiseOverride& c) {
   const std::string_view absent = "scenario";
-  v.value("gyro_noise_density_rad_s_sqrt_hz", c.gyro_noise_density, positive(), absent, "white noise it believes in");
-  v.value("gyro_bias_walk_rad_s2_sqrt_hz", c.gyro_bias_walk, positive(), absent, "random walk it believes in");
-  v.value("accel_noise_density_m_s2_sqrt_hz", c.accel_noise_density, positive(), absent, "white noise it believes in");
-  v.value("accel_bias_walk_m_s3_sqrt_hz", c.accel_bias_walk, positive(), absent, "random walk it believes in");
+  const core::Range density = sigma_up_to(core::kMostNoiseDensity);
+  v.value("gyro_noise_density_rad_s_sqrt_hz", c.gyro_noise_density, density, absent, "white noise it believes in");
+  v.value("gyro_bias_walk_rad_s2_sqrt_hz", c.gyro_bias_walk, density, absent, "random walk it believes in");
+  v.value("accel_noise_density_m_s2_sqrt_hz", c.accel_noise_density, density, absent, "white noise it believes in");
+  v.value("accel_bias_walk_m_s3_sqrt_hz", c.accel_bias_walk, density, absent, "random walk it believes in");
 }
 
 static void visit(core::ConfigVisitor& v, EstimateWhat& c) {
@@ -32,14 +35,15 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.choice("initialisation", c.initialisation, kInitialisationNames, "`prior`: starts from the scenario's prior");
   v.choice("solver", c.solver, kLinearSolverNames,
            "of Ceres, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
-  v.value("keyframe_rate_hz", c.keyframe_rate_hz, positive(), "only keyframes' observations enter");
-  v.value("pixel_sigma_px", c.pixel_sigma_px, positive(), "scenario", "pixel noise it believes in");
-  v.value("state_td_s", c.state_td_s, core::any(), "estimate",
+  v.value("keyframe_rate_hz", c.keyframe_rate_hz, core::positive_up_to(core::kMostFrequencyHz),
+          "only keyframes' observations enter");
+  v.value("pixel_sigma_px", c.pixel_sigma_px, sigma_up_to(core::kMostPixels), "scenario", "pixel noise it believes in");
+  v.value("state_td_s", c.state_td_s, core::within(core::kMostTimeOffsetS), "estimate",
           "td by which the states lie at the frames; `estimate`: the prior's, and anew where td has left it by 5 ms");
   v.section("imu", c.imu, "IMU noise it believes in; must be given where the scenario's is 0");
   v.section("estimate", c.estimate, "what is free; the rest is held at the prior's mean");
   v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");
-  v.value("max_cost_per_dof", c.max_cost_per_dof, positive(),
+  v.value("max_cost_per_dof", c.max_cost_per_dof, core::positive(),
           "a mean squared whitened residual above it is a false minimum: a failed trial");
 }
 

@@ -8,14 +8,17 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/physical_ranges.h"
 #include "estimator/batch.h"
 
 namespace plumbline::estimator {
 namespace {
 
-void require_positive(double value, std::string_view key, std::string_view meaning) {
-  if (!(value > 0.0)) {
-    throw core::ConfigError(fmt::format("{}: must be > 0 for the estimator ({} is {})", key, meaning, value));
+// What the estimator divides by.
+void require_weight(double value, std::string_view key, std::string_view meaning) {
+  if (!(value >= core::kLeastSigma)) {
+    throw core::ConfigError(
+        fmt::format("{}: must be >= {} for the estimator ({} is {})", key, core::kLeastSigma, meaning, value));
   }
 }
 
@@ -39,17 +42,17 @@ std::optional<std::string> gap_in_imu(const std::vector<core::ImuSample>& imu) {
 
 void require_usable(const BelievedNoise& noise, const core::CalibrationSigmas& sigma, const EstimateWhat& free) {
   const std::string_view fallback = "it defaults to the scenario's, which";
-  require_positive(noise.pixel_sigma_px, "estimator.pixel_sigma_px", fallback);
-  require_positive(noise.imu.gyro_noise_density, "estimator.imu.gyro_noise_density_rad_s_sqrt_hz", fallback);
-  require_positive(noise.imu.gyro_bias_walk, "estimator.imu.gyro_bias_walk_rad_s2_sqrt_hz", fallback);
-  require_positive(noise.imu.accel_noise_density, "estimator.imu.accel_noise_density_m_s2_sqrt_hz", fallback);
-  require_positive(noise.imu.accel_bias_walk, "estimator.imu.accel_bias_walk_m_s3_sqrt_hz", fallback);
+  require_weight(noise.pixel_sigma_px, "estimator.pixel_sigma_px", fallback);
+  require_weight(noise.imu.gyro_noise_density, "estimator.imu.gyro_noise_density_rad_s_sqrt_hz", fallback);
+  require_weight(noise.imu.gyro_bias_walk, "estimator.imu.gyro_bias_walk_rad_s2_sqrt_hz", fallback);
+  require_weight(noise.imu.accel_noise_density, "estimator.imu.accel_noise_density_m_s2_sqrt_hz", fallback);
+  require_weight(noise.imu.accel_bias_walk, "estimator.imu.accel_bias_walk_m_s3_sqrt_hz", fallback);
   const std::string_view width = "a free parameter needs a prior with a width, which";
-  if (free.td) require_positive(sigma.td_s, "scenario.prior.td_sigma_s", width);
-  if (free.readout) require_positive(sigma.readout_s, "scenario.prior.readout_sigma_s", width);
+  if (free.td) require_weight(sigma.td_s, "scenario.prior.td_sigma_s", width);
+  if (free.readout) require_weight(sigma.readout_s, "scenario.prior.readout_sigma_s", width);
   if (free.extrinsics) {
-    require_positive(sigma.extrinsic_position_m, "scenario.prior.extrinsic_position_sigma_m", width);
-    require_positive(sigma.extrinsic_rotation_rad, "scenario.prior.extrinsic_rotation_sigma_rad", width);
+    require_weight(sigma.extrinsic_position_m, "scenario.prior.extrinsic_position_sigma_m", width);
+    require_weight(sigma.extrinsic_rotation_rad, "scenario.prior.extrinsic_rotation_sigma_rad", width);
   }
 }
 

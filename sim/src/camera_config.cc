@@ -3,14 +3,14 @@
 #include <cmath>
 
 #include "core/camera_config.h"
+#include "core/physical_ranges.h"
 
 namespace plumbline::sim {
 
-using core::any;
 using core::at_least;
-using core::non_negative;
-using core::positive;
+using core::positive_up_to;
 using core::probability;
+using core::up_to;
 
 void visit(core::ConfigVisitor& v, CameraConfig& c) {
   v.value("rate_hz", c.rate_hz, core::between(0.1, 1000.0), "frames a second");
@@ -26,25 +26,26 @@ void visit(core::ConfigVisitor& v, CameraConfig& c) {
   v.value("stamp_jitter_s", c.stamp_jitter_s, core::between(0.0, 0.02),
           "sigma of the stamps about the true frame times; cut at 4 sigma");
   v.value("drop_probability", c.drop_probability, probability(), "that a frame is lost; its tracks run on");
-  v.value("pixel_sigma_px", c.pixel_sigma_px, non_negative(), "noise of u and v");
-  v.value("pixel_noise_dof", c.pixel_noise_dof, core::Range{.lower = 2.0, .lower_open = true}, "normal",
+  v.value("pixel_sigma_px", c.pixel_sigma_px, up_to(core::kMostPixels), "noise of u and v");
+  v.value("pixel_noise_dof", c.pixel_noise_dof, core::Range{.lower = 2.0, .upper = 1e6, .lower_open = true}, "normal",
           "Student's t of so many degrees of freedom, of the same variance");
   v.value("pixel_noise_correlation", c.pixel_noise_correlation,
           core::Range{.lower = 0.0, .upper = 1.0, .upper_open = true},
           "of the noise of a track in consecutive frames, first-order autoregressive");
   v.value("gross_outlier_probability", c.gross_outlier_probability, probability(), "that an observation is far off");
-  v.value("gross_outlier_sigma_px", c.gross_outlier_sigma_px, non_negative(), "how far, u and v, on top of the noise");
+  v.value("gross_outlier_sigma_px", c.gross_outlier_sigma_px, up_to(core::kMostPixels),
+          "how far, u and v, on top of the noise");
   v.value("uniform_outlier_probability", c.uniform_outlier_probability, probability(),
           "that an observation is anywhere in the picture");
-  v.value("extrinsic_position_m", c.extrinsic_position_m, any(), "p_B_C, the camera in the body");
+  v.value("extrinsic_position_m", c.extrinsic_position_m, core::within(core::kMostM), "p_B_C, the camera in the body");
   v.value("extrinsic_rotation_xyzw", c.extrinsic_rotation_xyzw, core::between(-1.0, 1.0),
           "R_B_C as a unit quaternion; the default looks along the body's x axis");
 }
 
 void visit(core::ConfigVisitor& v, PointsConfig& c) {
   v.value("per_frame", c.per_frame, core::between(0, 100000), "most points that a frame tracks");
-  v.value("nearest_m", c.nearest_m, positive(), "smallest depth that is tracked");
-  v.value("farthest_m", c.farthest_m, positive(), "largest depth that is tracked");
+  v.value("nearest_m", c.nearest_m, positive_up_to(core::kMostPathM), "smallest depth that is tracked");
+  v.value("farthest_m", c.farthest_m, positive_up_to(core::kMostPathM), "largest depth that is tracked");
   v.value("loss_probability", c.loss_probability, probability(), "that a track ends at a frame");
   v.value("longest_track_frames", c.longest_track_frames, at_least(0), "a track ends after as many; 0 is no limit");
   v.choice("velocity_source", c.velocity_source, kVelocitySourceNames,

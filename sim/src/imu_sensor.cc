@@ -3,6 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/physical_ranges.h"
+
 namespace plumbline::sim {
 namespace {
 
@@ -76,6 +81,12 @@ ImuRecording simulate_imu(const Trajectory& trajectory, const ImuConfig& config,
       const Eigen::Vector3d a_m = M_a * f + bias.accel_m_s2 + accel_sigma.cwiseProduct(accel_white.normal3(i));
       recording.samples.push_back(
           {.t_ns = stamp_ns, .gyro_rad_s = read_out(config.gyro, w_m), .accel_m_s2 = read_out(config.accel, a_m)});
+    }
+    if (!missing[i] && !core::is_physical(recording.samples.back())) {
+      throw core::DataError(fmt::format(
+          "scenario: at {} s the IMU would read more than {} rad/s or {} m/s^2; scenario.trajectory must be "
+          "slower, or the errors of scenario.imu smaller",
+          core::to_seconds(t_ns), core::kMostGyroReadingRadS, core::kMostAccelReadingMS2));
     }
     recording.stamps_ns.push_back(stamp_ns);
     recording.biases.push_back(bias);

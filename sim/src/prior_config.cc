@@ -1,9 +1,11 @@
 #include "sim/prior_config.h"
 
+#include "core/physical_ranges.h"
+
 namespace plumbline::sim {
 
-using core::non_negative;
-using core::positive;
+using core::sigma_up_to;
+using core::up_to;
 
 void visit(core::ConfigVisitor& v, PriorConfig& c) {
   v.choice("means", c.means, kPriorMeansNames,
@@ -11,15 +13,20 @@ void visit(core::ConfigVisitor& v, PriorConfig& c) {
   v.choice("start", c.start, kPriorStartNames, "where the iteration starts: at the means, or at a draw of its own");
   v.value("td_mean_s", c.td_mean_s, core::between(-1.0, 1.0), "drawn",
           "td of the middle row; with a fixed value no NEES of td is reported");
-  v.value("td_sigma_s", c.td_sigma_s, non_negative(), "of the time offset");
-  v.value("readout_sigma_s", c.readout_sigma_s, non_negative(), "of the readout");
-  v.value("extrinsic_position_sigma_m", c.extrinsic_position_sigma_m, non_negative(), "of p_B_C, each axis");
-  v.value("extrinsic_rotation_sigma_rad", c.extrinsic_rotation_sigma_rad, non_negative(), "of R_B_C, each axis");
-  v.value("position_sigma_m", c.position_sigma_m, positive(), "of the first state, each axis; fixes the gauge");
-  v.value("orientation_sigma_rad", c.orientation_sigma_rad, positive(), "of the first state, each axis");
-  v.value("velocity_sigma_m_s", c.velocity_sigma_m_s, positive(), "of the first state, each axis");
-  v.value("gyro_bias_sigma_rad_s", c.gyro_bias_sigma_rad_s, positive(), "of the first state, each axis");
-  v.value("accel_bias_sigma_m_s2", c.accel_bias_sigma_m_s2, positive(), "of the first state, each axis");
+  v.value("td_sigma_s", c.td_sigma_s, up_to(core::kMostTimeOffsetSigmaS), "of the time offset");
+  v.value("readout_sigma_s", c.readout_sigma_s, up_to(core::kMostTimeOffsetSigmaS), "of the readout");
+  v.value("extrinsic_position_sigma_m", c.extrinsic_position_sigma_m, up_to(core::kMostM), "of p_B_C, each axis");
+  v.value("extrinsic_rotation_sigma_rad", c.extrinsic_rotation_sigma_rad, up_to(core::kMostAngleRad),
+          "of R_B_C, each axis");
+  v.value("position_sigma_m", c.position_sigma_m, sigma_up_to(core::kMostM),
+          "of the first state, each axis; fixes the gauge");
+  v.value("orientation_sigma_rad", c.orientation_sigma_rad, sigma_up_to(core::kMostAngleRad),
+          "of the first state, each axis");
+  v.value("velocity_sigma_m_s", c.velocity_sigma_m_s, sigma_up_to(core::kMostSpeedMS), "of the first state, each axis");
+  v.value("gyro_bias_sigma_rad_s", c.gyro_bias_sigma_rad_s, sigma_up_to(core::kMostRateRadS),
+          "of the first state, each axis");
+  v.value("accel_bias_sigma_m_s2", c.accel_bias_sigma_m_s2, sigma_up_to(core::kMostAccelerationMS2),
+          "of the first state, each axis");
 }
 
 core::StateSigmas PriorConfig::state_sigmas() const {

@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include "core/error.h"
 #include "sim/wall_landmarks.h"
 #include "sim/world.h"
 
@@ -74,12 +77,25 @@ struct House {
   std::vector<double> y;
 };
 
+// Each room costs a wall or two, and each landmark is asked of each wall.
+void require_few_rooms(const House& house, double longest_side_m) {
+  constexpr double kMostRooms = 1000.0;
+  const Eigen::Vector3d size_m = house.box.sizes();
+  const double rooms = std::ceil(size_m.x() / longest_side_m) * std::ceil(size_m.y() / longest_side_m);
+  if (rooms <= kMostRooms) return;
+  throw core::DataError(fmt::format(
+      "scenario.world.rooms.longest_side_m: must be larger, or the margin and the path smaller: {} m divide "
+      "a house of {:.0f} m x {:.0f} m into {} rooms, at most {} are built",
+      longest_side_m, size_m.x(), size_m.y(), rooms, kMostRooms));
+}
+
 House house_about(const std::vector<Eigen::Vector3d>& path_W, const WorldConfig& config) {
   House house;
   for (const Eigen::Vector3d& p : path_W) house.box.extend(p);
   const double margin_m = std::max(config.rooms.margin_m, config.walls.clearance_m);
   house.box.min() -= Eigen::Vector3d(margin_m, margin_m, config.walls.floor_below_m);
   house.box.max() += Eigen::Vector3d(margin_m, margin_m, config.walls.ceiling_above_m);
+  require_few_rooms(house, config.rooms.longest_side_m);
   for (const int axis : {0, 1}) {
     std::vector<double> coordinates;
     coordinates.reserve(path_W.size());

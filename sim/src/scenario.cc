@@ -3,6 +3,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/physical_ranges.h"
+
 namespace plumbline::sim {
 
 core::RigCalibration ScenarioConfig::calibration() const {
@@ -16,7 +18,7 @@ core::RigCalibration ScenarioConfig::calibration() const {
 
 void visit(core::ConfigVisitor& v, ScenarioConfig& c) {
   v.value("duration_s", c.duration_s, core::between(1.0, 3600.0), "of the recording, IMU clock");
-  v.value("gravity_m_s2", c.gravity_m_s2, core::non_negative(), "along -z of the world");
+  v.value("gravity_m_s2", c.gravity_m_s2, core::up_to(core::kMostGravityMS2), "along -z of the world");
   v.section("trajectory", c.trajectory, "how the body moves");
   v.section("imu", c.imu, "the inertial sensor");
   v.section("camera", c.camera, "the camera and how it is mounted");

@@ -1,7 +1,11 @@
 #include "sim/simulate.h"
 
+#include <algorithm>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "core/error.h"
 #include "sim/camera_sensor.h"
 #include "sim/imu_sensor.h"
 #include "sim/prior.h"
@@ -9,6 +13,22 @@
 #include "sim/world.h"
 
 namespace plumbline::sim {
+namespace {
+
+// Whatever the keys add up to.
+void require_finite(const std::vector<core::Frame>& frames) {
+  for (const core::Frame& frame : frames) {
+    const bool finite = std::all_of(frame.points.begin(), frame.points.end(), [](const core::PointObservation& p) {
+      return p.pixel.allFinite() && (!p.velocity || p.velocity->allFinite());
+    });
+    if (!finite) {
+      throw core::DataError(
+          fmt::format("scenario.camera: the frame at {} ns has an observation that is not finite", frame.t_cam_ns));
+    }
+  }
+}
+
+}  // namespace
 
 Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
   const auto trajectory = make_trajectory(config.trajectory, config.duration_s, id);
@@ -37,6 +57,7 @@ Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
     add_finite_difference_velocities(s.measurements.frames, s.measurements.camera,
                                      s.measurements.prior.calibration.readout_s);
   }
+  require_finite(s.measurements.frames);
   return s;
 }
 

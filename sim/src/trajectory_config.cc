@@ -2,58 +2,77 @@
 
 #include <string>
 
+#include "core/physical_ranges.h"
+
 namespace plumbline::sim {
 
 using core::any;
-using core::non_negative;
-using core::positive;
+using core::between;
+using core::positive_up_to;
+using core::up_to;
+using core::within;
+
+namespace {
+
+constexpr double kLeastFrequencyHz = 1e-6;
+constexpr double kLeastPeriodS = 0.01;
+constexpr double kMostPeriodS = 1e6;
+
+}  // namespace
 
 // Argument-dependent lookup finds these; it does not look into an unnamed namespace.
 static void visit(core::ConfigVisitor& v, HandheldConfig& c) {
-  v.value("speed_rms_m_s", c.speed_rms_m_s, non_negative(), "root mean square speed");
-  v.value("rate_rms_rad_s", c.rate_rms_rad_s, non_negative(),
+  v.value("speed_rms_m_s", c.speed_rms_m_s, up_to(core::kMostSpeedMS), "root mean square speed");
+  v.value("rate_rms_rad_s", c.rate_rms_rad_s, up_to(core::kMostRateRadS),
           "root mean square angular rate; the peak is about 2.2 times");
-  v.value("lowest_frequency_hz", c.lowest_frequency_hz, positive(), "lower end of the band of its sinusoids");
-  v.value("highest_frequency_hz", c.highest_frequency_hz, positive(), "upper end");
+  v.value("lowest_frequency_hz", c.lowest_frequency_hz, between(kLeastFrequencyHz, core::kMostFrequencyHz),
+          "lower end of the band of its sinusoids");
+  v.value("highest_frequency_hz", c.highest_frequency_hz, between(kLeastFrequencyHz, core::kMostFrequencyHz),
+          "upper end");
 }
 
 static void visit(core::ConfigVisitor& v, ConstantMotionConfig& c) {
-  v.value("rate_rad_s", c.rate_rad_s, any(), "angular rate, body axes");
-  v.value("velocity_body_m_s", c.velocity_body_m_s, any(), "`constant_twist`: velocity in body axes");
-  v.value("velocity_m_s", c.velocity_m_s, any(), "`constant_acceleration`: at the start, world axes");
-  v.value("acceleration_m_s2", c.acceleration_m_s2, any(),
+  v.value("rate_rad_s", c.rate_rad_s, within(core::kMostRateRadS), "angular rate, body axes");
+  v.value("velocity_body_m_s", c.velocity_body_m_s, within(core::kMostSpeedMS),
+          "`constant_twist`: velocity in body axes");
+  v.value("velocity_m_s", c.velocity_m_s, within(core::kMostSpeedMS),
+          "`constant_acceleration`: at the start, world axes");
+  v.value("acceleration_m_s2", c.acceleration_m_s2, within(core::kMostAccelerationMS2),
           "`constant_acceleration`: world axes; with a rate of 0 constant in body axes too");
 }
 
 static void visit(core::ConfigVisitor& v, LoopConfig& c) {
-  v.value("radius_m", c.radius_m, positive(), "of the circle, ball or torus; half the length of the figure eight");
-  v.value("height_amplitude_m", c.height_amplitude_m, non_negative(),
+  v.value("radius_m", c.radius_m, positive_up_to(core::kMostM),
+          "of the circle, ball or torus; half the length of the figure eight");
+  v.value("height_amplitude_m", c.height_amplitude_m, up_to(core::kMostM),
           "of the up and down of the circles and the figure eight, three times a loop");
-  v.value("period_s", c.period_s, positive(), "of one loop");
-  v.value("waves", c.waves, core::at_least(1), "`wavy_circle`: ups and downs a loop");
-  v.value("tube_radius_m", c.tube_radius_m, positive(), "`torus`: of its tube");
+  v.value("period_s", c.period_s, between(kLeastPeriodS, kMostPeriodS), "of one loop");
+  v.value("waves", c.waves, between(1, 1000), "`wavy_circle`: ups and downs a loop");
+  v.value("tube_radius_m", c.tube_radius_m, positive_up_to(core::kMostM), "`torus`: of its tube");
 }
 
 static void visit(core::ConfigVisitor& v, Sine3dConfig& c) {
-  v.value("acceleration_m_s2", c.acceleration_m_s2, positive(), "along the body's x axis");
-  v.value("yaw_period_s", c.yaw_period_s, positive(), "of a turn about the vertical");
-  v.value("pitch_period_s", c.pitch_period_s, positive(), "of a turn head over heels; not the yaw's");
+  v.value("acceleration_m_s2", c.acceleration_m_s2, positive_up_to(core::kMostAccelerationMS2),
+          "along the body's x axis");
+  v.value("yaw_period_s", c.yaw_period_s, between(kLeastPeriodS, kMostPeriodS), "of a turn about the vertical");
+  v.value("pitch_period_s", c.pitch_period_s, between(kLeastPeriodS, kMostPeriodS),
+          "of a turn head over heels; not the yaw's");
 }
 
 static void visit_terms(core::ConfigVisitor& v, WaveConfig& c) {
-  v.value("frequency_hz", c.frequency_hz, positive(), "of each term");
+  v.value("frequency_hz", c.frequency_hz, between(kLeastFrequencyHz, core::kMostFrequencyHz), "of each term");
   v.value("phase_rad", c.phase_rad, any(), "of each term at the start; none are zeros");
 }
 
 static void visit(core::ConfigVisitor& v, PositionWaveConfig& c) {
-  v.value("offset_m", c.offset, any(), "mean");
-  v.value("amplitude_m", c.amplitude, any(), "of each term");
+  v.value("offset_m", c.offset, within(core::kMostM), "mean");
+  v.value("amplitude_m", c.amplitude, within(core::kMostM), "of each term");
   visit_terms(v, c);
 }
 
 static void visit(core::ConfigVisitor& v, AngleWaveConfig& c) {
-  v.value("offset_rad", c.offset, any(), "mean");
-  v.value("amplitude_rad", c.amplitude, any(), "of each term");
+  v.value("offset_rad", c.offset, within(core::kMostAngleRad), "mean");
+  v.value("amplitude_rad", c.amplitude, within(core::kMostAngleRad), "of each term");
   visit_terms(v, c);
 }
 
@@ -81,15 +100,16 @@ void visit(core::ConfigVisitor& v, TrajectoryConfig& c) {
   v.path("file", c.file, "`spline`: recorded poses T_W_B");
   v.choice("format", c.format, core::kPoseFormatNames,
            "`spline`: of the file; `auto` tells by its first line: commas are EuRoC's, 12 numbers KITTI's");
-  v.value("pose_rate_hz", c.pose_rate_hz, non_negative(),
+  v.value("pose_rate_hz", c.pose_rate_hz, up_to(core::kMostFrequencyHz),
           "`spline`: poses a second of a KITTI file, which has no stamps");
-  v.value("start_s", c.start_s, non_negative(), "`spline`: where in the file the recording starts, in the file's time");
-  v.value("knot_interval_s", c.knot_interval_s, core::at_least(0.01),
+  v.value("start_s", c.start_s, core::non_negative(),
+          "`spline`: where in the file the recording starts, in the file's time");
+  v.value("knot_interval_s", c.knot_interval_s, between(0.01, 100.0),
           "`spline`: wider smooths more, in the file's time; interpolated measurement noise would fake excitation");
-  v.value("largest_gap_s", c.largest_gap_s, positive(), "`spline`: a wider one between poses is a gap");
+  v.value("largest_gap_s", c.largest_gap_s, core::positive(), "`spline`: a wider one between poses is a gap");
   v.choice("on_gap", c.on_gap, kOnGapNames,
            "`spline`: gaps are refused, or start_s counts from the longest piece of the file without one");
-  v.value("speed_up", c.speed_up, positive(),
+  v.value("speed_up", c.speed_up, between(1e-3, 1e3),
           "`spline`: the path travelled so many times faster; speed and rate grow as it, accelerations as its square");
 }
 

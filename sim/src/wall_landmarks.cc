@@ -1,7 +1,8 @@
 #include "sim/wall_landmarks.h"
 
 #include <algorithm>
-#include <stdexcept>
+
+#include "core/error.h"
 
 namespace plumbline::sim {
 
@@ -16,7 +17,11 @@ std::vector<Eigen::Vector3d> scatter_on(const std::vector<Wall>& faces, int land
   points_W.reserve(static_cast<std::size_t>(landmarks));
   for (int i = 0; i < landmarks; ++i) {
     for (std::uint64_t draw = 0;; ++draw) {
-      if (draw == kMostDraws) throw std::logic_error("scatter_on: the faces have hardly any area");
+      if (draw == kMostDraws) {
+        throw core::DataError(
+            "scenario.world: the walls have hardly any area for landmarks; doors and walls.clearance_m must be "
+            "smaller");
+      }
       const auto u = stream.uniforms(static_cast<std::uint64_t>(i), draw);
       const auto above = std::upper_bound(area_up_to.begin() + 1, area_up_to.end() - 1, u[0] * area_up_to.back());
       const Wall& face = faces[static_cast<std::size_t>(above - area_up_to.begin()) - 1];

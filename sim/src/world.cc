@@ -6,7 +6,10 @@
 #include <numbers>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include "core/error.h"
+#include "core/physical_ranges.h"
 
 namespace plumbline::sim {
 namespace {
@@ -47,6 +50,10 @@ Path sample_path(const ScenarioConfig& scenario, const Trajectory& trajectory) {
     const core::Pose T_W_B = trajectory.pose_at(scenario.duration_s * i / n);
     path.body_W.push_back(T_W_B.p);
     path.camera_W.push_back(T_W_B * calibration.T_B_C.p);
+    if (!(path.camera_W.back().array().abs() <= core::kMostPathM).all()) {
+      throw core::DataError(
+          fmt::format("scenario.trajectory: must stay within {} m for a world about its path", core::kMostPathM));
+    }
   }
   return path;
 }
@@ -93,7 +100,11 @@ World frustum_world(const ScenarioConfig& scenario, const Trajectory& trajectory
   constexpr std::uint64_t kMostDraws = 10000;
   for (int i = 0; i < config.landmarks; ++i) {
     for (std::uint64_t draw = 0;; ++draw) {
-      if (draw == kMostDraws) throw std::logic_error("frustum_world: hardly any pixel has a ray");
+      if (draw == kMostDraws) {
+        throw core::DataError(
+            "scenario.camera.distortion_coefficients: hardly any pixel has a ray for `frustum` to draw from; the "
+            "distortion must be weaker, or scenario.world.type another");
+      }
       const auto u = stream.uniforms(static_cast<std::uint64_t>(i), draw);
       const auto ray = camera.try_unproject({u[1] * camera.width_px - 0.5, u[2] * camera.height_px - 0.5});
       if (!ray) continue;

@@ -1,4 +1,5 @@
-// A sound dataset with one file replaced: the first byte chooses the file, the others are its text.
+// A sound dataset with one file replaced: the first byte chooses the file, the others are its text. What the reader
+// accepts is estimated, a few iterations long: whatever the numbers are, the answer is a status.
 #include <array>
 #include <cstdlib>
 #include <filesystem>
@@ -8,6 +9,7 @@
 
 #include "core/dataset.h"
 #include "core/error.h"
+#include "estimator/estimate.h"
 #include "sim/simulate.h"
 
 namespace {
@@ -29,6 +31,7 @@ class Folder {
     sim::ScenarioConfig scenario;
     scenario.duration_s = 1.0;
     scenario.imu.rate_hz = 20.0;
+    scenario.imu.noise = {1e-3, 1e-4, 1e-2, 1e-3};
     scenario.points.per_frame = 3;
     core::write_dataset(path_ / "dataset", sim::simulate(scenario, {}).measurements, {});
   }
@@ -52,7 +55,10 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
   const std::string sound{std::istreambuf_iterator<char>(in), {}};
   std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(data + 1), static_cast<long>(size - 1));
   try {
-    core::read_dataset(folder.dataset());
+    const core::MeasurementLog log = core::read_dataset(folder.dataset());
+    estimator::EstimatorConfig config;
+    config.max_iterations = 2;
+    estimator::estimate(log, config);
   } catch (const core::InputError&) {
   }
   std::ofstream(file, std::ios::binary).write(sound.data(), static_cast<long>(sound.size()));

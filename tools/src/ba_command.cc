@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/atomic_file.h"
 #include "core/bal_file.h"
 #include "core/error.h"
 #include "core/lie.h"
@@ -116,6 +117,7 @@ int ba(const BaOptions& options) {
 }
 
 int simulate_ba(const SimulateBaOptions& options) {
+  core::require_no_file_above(options.out / "problem.txt");
   for (const char* name : {"problem.txt", "truth.txt"}) {
     if (std::filesystem::exists(options.out / name)) {
       throw core::DataError(fmt::format("{}: exists already", (options.out / name).generic_string()));

@@ -1,6 +1,8 @@
 #include "tools/commands.h"
 
+#include <exception>
 #include <optional>
+#include <stdexcept>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -63,7 +65,27 @@ void write_estimate(const std::filesystem::path& folder, const core::EstimateLog
   core::write_file_atomically(folder / "meta.yaml", core::to_yaml(meta));
 }
 
+// The file read as one of that kind, in words.
+std::string load_as(ConfigKind kind, const std::filesystem::path& file, const std::vector<std::string>& set) {
+  switch (kind) {
+    case ConfigKind::kExperiment: {
+      const Plan plan = load_plan(file, set);
+      return fmt::format("experiment '{}', {} cells x {} trials", plan.base.experiment.name, plan.cells.size(),
+                         plan.base.experiment.trials);
+    }
+    case ConfigKind::kScenario:
+      load_scenario(file, set);
+      return "scenario";
+    case ConfigKind::kEstimator:
+      load_estimator(file, set);
+      return "estimator";
+  }
+  throw std::logic_error("load_as: unknown kind");
+}
+
+// Throws where the folder, which need not be there yet, holds something already, or is to lie below a file.
 void refuse_existing(const std::filesystem::path& folder) {
+  core::require_no_file_above(folder);
   const bool empty = std::filesystem::is_directory(folder) && std::filesystem::is_empty(folder);
   if (std::filesystem::exists(folder) && !empty) {
     throw core::DataError(fmt::format("{}: exists and is not an empty folder", folder.generic_string()));
@@ -185,22 +207,18 @@ int replay(const ReplayOptions& options) {
 int check(const CheckOptions& options) {
   if (options.keys) fmt::print("{}", key_table());
   for (const std::filesystem::path& file : options.files) {
-    switch (config_kind(file)) {
-      case ConfigKind::kExperiment: {
-        const Plan plan = load_plan(file, options.set);
-        fmt::print("{}: experiment '{}', {} cells x {} trials\n", file.generic_string(), plan.base.experiment.name,
-                   plan.cells.size(), plan.base.experiment.trials);
-        break;
+    std::string what;
+    std::exception_ptr refusal;  // of the kind that is likeliest
+    for (const ConfigKind kind : config_kinds(file)) {
+      try {
+        const std::string loaded = load_as(kind, file, options.set);
+        what += (what.empty() ? "" : " or ") + loaded;
+      } catch (const core::InputError&) {
+        if (!refusal) refusal = std::current_exception();
       }
-      case ConfigKind::kScenario:
-        load_scenario(file, options.set);
-        fmt::print("{}: scenario\n", file.generic_string());
-        break;
-      case ConfigKind::kEstimator:
-        load_estimator(file, options.set);
-        fmt::print("{}: estimator\n", file.generic_string());
-        break;
     }
+    if (what.empty()) std::rethrow_exception(refusal);
+    fmt::print("{}: {}\n", file.generic_string(), what);
   }
   return kExitOk;
 }

@@ -10,6 +10,7 @@
 #include "core/hash.h"
 #include "core/resolved_config.h"
 #include "estimator/estimate.h"
+#include "sim/imu_sensor.h"
 #include "sim/trajectory.h"
 #include "sim/world.h"
 
@@ -165,8 +166,15 @@ void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_
   }
 }
 
-// What only shows when a cell's parts meet: noise the estimator cannot work with, pose files that are too short, worlds
-// without room for the path.
+// What only shows when a scenario's parts meet: pose files that are too short, worlds without room for the path, motion
+// that no IMU could follow.
+void check_scenario(const sim::ScenarioConfig& scenario, core::TrialId id) {
+  const auto trajectory = sim::make_trajectory(scenario.trajectory, scenario.duration_s, id);
+  sim::make_world(scenario, *trajectory, id);
+  sim::simulate_imu(*trajectory, scenario.imu, scenario.gravity_m_s2, scenario.duration_s, id);
+}
+
+// Likewise a cell's: noise the estimator cannot work with.
 void check_cell(const Experiment& e) {
   estimator::require_usable(
       estimator::believed_noise(e.estimator, e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px),
@@ -185,9 +193,7 @@ void check_cell(const Experiment& e) {
           "scenario.imu must be > 0");
     }
   }
-  const core::TrialId id{e.experiment.seed, 0};
-  const auto trajectory = sim::make_trajectory(e.scenario.trajectory, e.scenario.duration_s, id);
-  sim::make_world(e.scenario, *trajectory, id);
+  check_scenario(e.scenario, {e.experiment.seed, 0});
 }
 
 Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std::string& default_name) {
@@ -238,6 +244,17 @@ ConfigTree wrap(const std::filesystem::path& file, const std::string& key) {
   return root;
 }
 
+// How many keys of the tree, with all below them, are documented.
+int known_keys(const ConfigTree& tree, const std::string& prefix, const std::vector<core::KeyDoc>& docs) {
+  int count = 0;
+  for (const ConfigEntry& entry : tree.entries) {
+    const std::string key = prefix + entry.key;
+    if (std::any_of(docs.begin(), docs.end(), [&](const core::KeyDoc& doc) { return doc.key == key; })) ++count;
+    count += known_keys(entry.value, key + ".", docs);
+  }
+  return count;
+}
+
 }  // namespace
 
 std::string run_id(const Cell& cell, int trial) {
@@ -256,7 +273,7 @@ Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>
 
 sim::ScenarioConfig load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
   const Experiment experiment = read_experiment(apply_overrides(wrap(file, "scenario"), overrides, nullptr));
-  sim::make_trajectory(experiment.scenario.trajectory, experiment.scenario.duration_s, {});
+  check_scenario(experiment.scenario, {});
   return experiment.scenario;
 }
 
@@ -317,22 +334,23 @@ Plan read_manifest(const std::filesystem::path& file) {
   return plan;
 }
 
-ConfigKind config_kind(const std::filesystem::path& file) {
+std::vector<ConfigKind> config_kinds(const std::filesystem::path& file) {
   const ConfigTree root = core::load_config_file(file);
   require_map(root, "");
-  const auto has_any = [&](std::span<const std::string_view> keys) {
-    return std::any_of(root.entries.begin(), root.entries.end(),
-                       [&](const ConfigEntry& e) { return std::find(keys.begin(), keys.end(), e.key) != keys.end(); });
-  };
   constexpr std::array<std::string_view, 5> kExperimentKeys = {"experiment", "scenario", "estimator", "eval", "set"};
-  constexpr std::array<std::string_view, 8> kScenarioKeys = {"duration_s", "gravity_m_s2", "trajectory", "camera",
-                                                             "world",      "points",       "prior",      "imu"};
-  constexpr std::array<std::string_view, 7> kEstimatorKeys = {"type",     "timing", "residual",        "landmark",
-                                                              "estimate", "solver", "keyframe_rate_hz"};
-  if (has_any(kExperimentKeys)) return ConfigKind::kExperiment;
-  if (has_any(kEstimatorKeys)) return ConfigKind::kEstimator;
-  if (has_any(kScenarioKeys)) return ConfigKind::kScenario;
-  throw core::config_error(root.origin, "", "is neither an experiment nor a scenario nor an estimator");
+  const bool is_experiment = std::any_of(root.entries.begin(), root.entries.end(), [&](const ConfigEntry& e) {
+    return std::find(kExperimentKeys.begin(), kExperimentKeys.end(), e.key) != kExperimentKeys.end();
+  });
+  if (is_experiment) return {ConfigKind::kExperiment};
+  const int of_scenario = known_keys(root, "", core::document_config(sim::ScenarioConfig{}, ""));
+  const int of_estimator = known_keys(root, "", core::document_config(estimator::EstimatorConfig{}, ""));
+  if (of_scenario == 0 && of_estimator == 0) {
+    throw core::config_error(root.origin, "", "is neither an experiment nor a scenario nor an estimator");
+  }
+  std::vector<ConfigKind> kinds;
+  if (of_scenario >= of_estimator) kinds.push_back(ConfigKind::kScenario);
+  if (of_estimator >= of_scenario) kinds.push_back(ConfigKind::kEstimator);
+  return kinds;
 }
 
 }  // namespace plumbline::tools

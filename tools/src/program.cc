@@ -135,9 +135,12 @@ int parse_and_run(int argc, const char* const* argv) {
 
   CheckOptions check_options;
   CLI::App* check_command = app.add_subcommand("check", "check configuration files");
-  check_command->add_option("CONFIG", check_options.files, "experiments, scenarios or estimators");
+  CLI::Option* configs =
+      check_command->add_option("CONFIG", check_options.files, "experiments, scenarios or estimators");
   check_command->add_flag("--keys", check_options.keys, "print all keys with defaults and rules");
   add_set(check_command, check_options.set);
+  check_command->get_option("--set")->needs(configs);
+  check_command->require_option(1, 0);
 
   try {
     app.parse(argc, argv);

@@ -66,6 +66,7 @@ ordered_json runtime_summary(const TrialTimings& sum, int n) {
 
 // A folder may hold results of the same configuration with at most as many trials; all else would be lost.
 void refuse_to_lose(const std::filesystem::path& out, const Plan& plan, bool fresh) {
+  core::require_no_file_above(out);
   const std::filesystem::path manifest = out / "manifest.json";
   if (std::filesystem::exists(out) && !std::filesystem::is_directory(out)) {
     throw core::DataError(fmt::format("{}: exists and is not a folder", out.generic_string()));

@@ -14,4 +14,7 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 // Syncs the closed file `from`, renames it to `to` and syncs the folder. Throws std::system_error.
 void publish_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
+// Throws DataError where the path cannot come to be, since what should be one of its folders is a file.
+void require_no_file_above(const std::filesystem::path& path);
+
 }  // namespace plumbline::core

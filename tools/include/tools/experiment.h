@@ -77,8 +77,9 @@ estimator::EstimatorConfig load_estimator(const std::optional<std::filesystem::p
 nlohmann::ordered_json to_manifest(const Plan& plan);
 Plan read_manifest(const std::filesystem::path& file);
 
-// What an experiment, scenario or estimator file is, told by its keys.
+// What an experiment, scenario or estimator file is, told by its keys. A scenario and an estimator share some keys: a
+// file that holds no others may be either.
 enum class ConfigKind { kExperiment, kScenario, kEstimator };
-ConfigKind config_kind(const std::filesystem::path& file);
+std::vector<ConfigKind> config_kinds(const std::filesystem::path& file);
 
 }  // namespace plumbline::tools
