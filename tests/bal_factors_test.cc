@@ -2,108 +2,24 @@
 #include "estimator/factors/bal_factors.h"
 
 #include <cmath>
-#include <memory>
-#include <vector>
 
-#include <ceres/autodiff_cost_function.h>
 #include <ceres/manifold_test_utils.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bal_subjects.h"
 #include "core/random.h"
 #include "factor_laws.h"
-#include "plain_lines.h"
 
 namespace plumbline::estimator {
 namespace {
 
 using core::BalCamera;
 using core::ViewAxis;
-using testing::Block;
-using testing::block;
+using testing::bal_scene;
+using testing::BalForm;
 using testing::FactorScene;
-using testing::FactorSubject;
-using testing::SceneRequest;
-
-const core::RandomStream kRandom({31, 0}, "bal_factors_test");
-const BalLeftCameraManifold kLeftManifold;
-
-enum class Form { kAdditive, kLeft };
-
-FactorScene make_scene(Form form, const BalCamera& camera, const Eigen::Vector3d& X, const Eigen::Vector2d& pixel,
-                       ViewAxis axis) {
-  const double s = axis == ViewAxis::kMinusZ ? -1.0 : 1.0;
-  FactorScene scene;
-  if (form == Form::kAdditive) {
-    scene.factor = std::make_unique<BalFactor>(pixel, axis);
-    scene.reference = std::make_unique<ceres::AutoDiffCostFunction<testing::PlainBal, 2, kBalCameraSize, 3>>(
-        new testing::PlainBal{pixel, s});
-    scene.blocks = {block(pack(camera)), block(X)};
-  } else {
-    scene.factor = std::make_unique<BalLeftFactor>(pixel, axis);
-    scene.reference = std::make_unique<ceres::AutoDiffCostFunction<testing::PlainBalLeft, 2, kBalLeftCameraSize, 3>>(
-        new testing::PlainBalLeft{{pixel, s}});
-    scene.blocks = {block(pack_left(camera), &kLeftManifold), block(X)};
-  }
-  return scene;
-}
-
-// A camera anywhere that looks at X from 2 to 6 m, X up to 25 degrees off its axis; every second one looks along +z.
-FactorScene random_scene(Form form, const SceneRequest& request) {
-  const std::uint64_t i = request.scene;
-  const ViewAxis axis = i % 2 == 0 ? ViewAxis::kMinusZ : ViewAxis::kPlusZ;
-  BalCamera camera{
-      .w = kRandom.normal3(i, 0),
-      .t = {},
-      .intrinsics = {500.0 + 50.0 * kRandom.normal(i, 1), -0.1 * kRandom.uniform(i, 2), 0.05 * kRandom.uniform(i, 3)}};
-  Eigen::Vector3d X = kRandom.normal3(i, 4);
-  const double z = (axis == ViewAxis::kMinusZ ? -1.0 : 1.0) * (2.0 + 4.0 * kRandom.uniform(i, 5));
-  const Eigen::Vector3d P_C(0.2 * z * kRandom.normal(i, 6), 0.2 * z * kRandom.normal(i, 7), z);
-  camera.t = P_C - core::exp_so3(camera.w) * X;
-  Eigen::Vector2d pixel = core::project_bal(camera.intrinsics, axis, P_C).value();
-  pixel += request.noise * kRandom.normal2(1000 + request.draw, i);
-  if (request.off_truth) {
-    camera.w += 0.02 * kRandom.normal3(i, 8);
-    camera.t += 0.05 * kRandom.normal3(i, 9);
-    camera.intrinsics.k1 += 0.02;
-    X += 0.05 * kRandom.normal3(i, 10);
-  }
-  // World to camera: R' = R R_new^T, t' = t - R' p_new.
-  const Eigen::Quaterniond q = core::exp_quaternion(camera.w) * request.T_new_W.q.conjugate();
-  camera.w = core::log_so3(q);
-  camera.t -= q * request.T_new_W.p;
-  return make_scene(form, camera, request.T_new_W * X, pixel, axis);
-}
-
-std::vector<FactorScene> limits(Form form) {
-  const core::BalIntrinsics lens{500.0, -0.1, 0.05};
-  const Eigen::Vector2d pixel(1.0, -2.0);
-  std::vector<FactorScene> scenes;
-  const auto add = [&](const BalCamera& camera, const Eigen::Vector3d& X) {
-    scenes.push_back(make_scene(form, camera, X, pixel, ViewAxis::kMinusZ));
-  };
-  const Eigen::Vector3d X(0.3, -0.2, -4.0);
-  add({.intrinsics = lens}, X);                                               // no rotation
-  add({.w = {1e-9, -2e-9, 1e-9}, .intrinsics = lens}, X);                     // hardly any
-  add({.w = {0.02, 0.02, 0.015}, .intrinsics = lens}, X);                     // where the series take over
-  add({.w = {0.0, 0.0, 3.14159265}, .intrinsics = lens}, X);                  // half a turn
-  add({.w = {0.0, 4.0, 0.0}, .t = {0.0, 0.0, -9.0}, .intrinsics = lens}, X);  // more
-  add({.intrinsics = lens}, {0.0, 0.0, -4.0});                                // on the axis
-  add({.intrinsics = lens}, {300.0, -200.0, -1e6});                           // far
-  add({.intrinsics = lens}, {1e-4, -1e-4, -1e-3});                            // near
-  add({.intrinsics = lens}, {0.3, -0.2, 4.0});                                // behind
-  return scenes;
-}
-
-std::vector<FactorSubject> subjects() {
-  std::vector<FactorSubject> list;
-  for (const Form form : {Form::kAdditive, Form::kLeft}) {
-    list.push_back({.name = form == Form::kAdditive ? "Additive" : "Left",
-                    .scene = [form](const SceneRequest& r) { return random_scene(form, r); },
-                    .limits = [form] { return limits(form); }});
-  }
-  return list;
-}
+using testing::kBalRandom;
 
 // A camera worked out by hand (docs/derivations.md).
 const BalCamera kCamera{.w = {0.3, -0.2, 0.1}, .t = {0.1, -0.2, 5.0}, .intrinsics = {500.0, -0.1, 0.05}};
@@ -126,11 +42,11 @@ TEST(BalFactors, HandWorkedJacobians) {
   Eigen::Matrix<double, 2, 3> by_w;
   by_w << -8.773236839549, 58.5640253854, -49.934591853689, -45.60630736055, 17.967090839166, 80.230662943103;
   for (const auto& [axis, sign] : {std::pair{ViewAxis::kPlusZ, 1.0}, std::pair{ViewAxis::kMinusZ, -1.0}}) {
-    const FactorScene additive = make_scene(Form::kAdditive, kCamera, kPoint, {0.0, 0.0}, axis);
+    const FactorScene additive = bal_scene(BalForm::kAdditive, kCamera, kPoint, {0.0, 0.0}, axis);
     const Eigen::MatrixXd J = testing::tangent_jacobian(*additive.factor, additive.blocks, 0);
     EXPECT_LT((sign * J.leftCols<3>() - by_w).cwiseAbs().maxCoeff(), kPrinted);
     EXPECT_LT((sign * J.middleCols<3>(3) - by_t).cwiseAbs().maxCoeff(), kPrinted);
-    const FactorScene left = make_scene(Form::kLeft, kCamera, kPoint, {0.0, 0.0}, axis);
+    const FactorScene left = bal_scene(BalForm::kLeft, kCamera, kPoint, {0.0, 0.0}, axis);
     const Eigen::MatrixXd J_left = testing::tangent_jacobian(*left.factor, left.blocks, 0);
     EXPECT_LT((sign * J_left.leftCols<3>() - by_w_left).cwiseAbs().maxCoeff(), kPrinted);
     EXPECT_LT((sign * J_left.middleCols<3>(3) - by_t).cwiseAbs().maxCoeff(), kPrinted);
@@ -141,7 +57,7 @@ TEST(BalFactors, HandWorkedJacobians) {
 TEST(BalFactors, FilesLookDownMinusZ) {
   const BalCamera camera{.intrinsics = {100.0, 0.0, 0.0}};
   const Eigen::Vector3d X(0.1, 0.2, -1.0);
-  const FactorScene scene = make_scene(Form::kAdditive, camera, X, {10.0, 20.0}, ViewAxis::kMinusZ);
+  const FactorScene scene = bal_scene(BalForm::kAdditive, camera, X, {10.0, 20.0}, ViewAxis::kMinusZ);
   EXPECT_LT(testing::residual(*scene.factor, scene.blocks).norm(), 1e-13);
   EXPECT_TRUE(core::in_front(camera, ViewAxis::kMinusZ, X));
   EXPECT_FALSE(core::in_front(camera, ViewAxis::kPlusZ, X));
@@ -150,19 +66,19 @@ TEST(BalFactors, FilesLookDownMinusZ) {
 // Both forms of Rodrigues' formula: a mixture of them is no rotation, which shows at large angles first.
 TEST(BalFactors, RotatesByTheMatrixOfItsVector) {
   for (std::uint64_t i = 0; i < 20; ++i) {
-    const Eigen::Vector3d w = 3.0 * kRandom.uniform(i, 20) * kRandom.normal3(i, 21).normalized();
-    const Eigen::Vector3d X = kRandom.normal3(i, 22);
+    const Eigen::Vector3d w = 3.0 * kBalRandom.uniform(i, 20) * kBalRandom.normal3(i, 21).normalized();
+    const Eigen::Vector3d X = kBalRandom.normal3(i, 22);
     const BalCamera camera{.w = w, .t = {0.0, 0.0, -9.0}, .intrinsics = {100.0, 0.0, 0.0}};
     const Eigen::Vector3d P = Eigen::AngleAxisd(w.norm(), w.normalized()) * X + camera.t;
-    const FactorScene scene = make_scene(Form::kAdditive, camera, X, -100.0 * P.head<2>() / P.z(), ViewAxis::kMinusZ);
+    const FactorScene scene = bal_scene(BalForm::kAdditive, camera, X, -100.0 * P.head<2>() / P.z(), ViewAxis::kMinusZ);
     EXPECT_LT(testing::residual(*scene.factor, scene.blocks).norm(), 1e-12);
   }
 }
 
 TEST(BalFactors, InThePlaneOfTheCameraIsFalse) {
-  for (const Form form : {Form::kAdditive, Form::kLeft}) {
+  for (const BalForm form : {BalForm::kAdditive, BalForm::kLeft}) {
     const FactorScene scene =
-        make_scene(form, {.intrinsics = {100.0, 0.0, 0.0}}, {1.0, 2.0, 0.0}, {1.0, 2.0}, ViewAxis::kMinusZ);
+        bal_scene(form, {.intrinsics = {100.0, 0.0, 0.0}}, {1.0, 2.0, 0.0}, {1.0, 2.0}, ViewAxis::kMinusZ);
     Eigen::Vector2d r;
     EXPECT_FALSE(scene.factor->Evaluate(testing::pointers(scene.blocks).data(), r.data(), nullptr));
   }
@@ -187,8 +103,8 @@ TEST(LeftSo3Manifold, ObeysTheLawsOfCeres) {
   const LeftSo3Manifold manifold;
   for (std::uint64_t i = 0; i < 10; ++i) {
     for (const double scale : {0.0, 1e-6, 0.1, 2.0}) {
-      const Vector x = core::exp_quaternion(kRandom.normal3(i, 30)).coeffs();
-      const Vector delta = scale * kRandom.normal3(i, 31).normalized();
+      const Vector x = core::exp_quaternion(kBalRandom.normal3(i, 30)).coeffs();
+      const Vector delta = scale * kBalRandom.normal3(i, 31).normalized();
       Vector y(4);
       manifold.Plus(x.data(), Eigen::Vector3d(1.0, -0.5, 0.3).data(), y.data());
       EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(manifold, x, delta, y, 1e-9);
@@ -210,5 +126,6 @@ TEST(LeftSo3Manifold, PerturbsOnTheLeftByTheWholeAngle) {
 }  // namespace plumbline::estimator
 
 namespace plumbline::testing {
-INSTANTIATE_TEST_SUITE_P(Bal, FactorLaws, ::testing::ValuesIn(estimator::subjects()), subject_name);
+INSTANTIATE_TEST_SUITE_P(Bal, FactorLaws, ::testing::ValuesIn(bal_subjects()), subject_name);
+INSTANTIATE_TEST_SUITE_P(Bal, WorldFrameLaws, ::testing::ValuesIn(in_world(bal_subjects())), subject_name);
 }  // namespace plumbline::testing

@@ -1,11 +1,13 @@
 // Laws that every factor obeys, as one suite. A test file describes its factors as subjects and instantiates
 //   INSTANTIATE_TEST_SUITE_P(Points, FactorLaws, ::testing::ValuesIn(subjects()), subject_name);
+//   INSTANTIATE_TEST_SUITE_P(Points, WorldFrameLaws, ::testing::ValuesIn(in_world(subjects())), subject_name);
 //   VanishesAtTheTruth        r = 0 at the truth of a simulated scene without noise
 //   JacobiansEqualAutomatic   analytic Jacobians equal those of the reference, by automatic differentiation
 //   JacobiansMatchRidders     and those of differences on the manifold, which know the residual only
 //   EveryNullJacobianPath     what is asked for does not depend on what else is
 //   HoldsAtTheLimits          zero angles, far and near: finite, and still equal to the reference
 //   WhitensItsNoise           residuals of simulated noise have unit covariance
+// and of what refers to the world's frame
 //   DoesNotSeeYawNorPlace     yaw and translation of the whole world leave the cost as it is
 #pragma once
 
@@ -103,7 +105,14 @@ TEST_P(FactorLaws, WhitensItsNoise) {
   }
 }
 
-TEST_P(FactorLaws, DoesNotSeeYawNorPlace) {
+class WorldFrameLaws : public FactorLaws {};
+
+inline std::vector<FactorSubject> in_world(std::vector<FactorSubject> subjects) {
+  std::erase_if(subjects, [](const FactorSubject& subject) { return !subject.in_world; });
+  return subjects;
+}
+
+TEST_P(WorldFrameLaws, DoesNotSeeYawNorPlace) {
   const core::Pose moved{core::exp_quaternion(Eigen::Vector3d(0.0, 0.0, 1.2)), {3.0, -2.0, 5.0}};
   for (std::uint64_t i = 0; i < kScenes; ++i) {
     const FactorScene here = GetParam().scene({.scene = i, .noise = 1.0, .off_truth = true});

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <gtest/gtest.h>
 
@@ -31,6 +32,11 @@ struct FactorScene {
   std::vector<Block> blocks;
 };
 
+template <class Plain, int kResiduals, int... kSizes>
+std::unique_ptr<ceres::CostFunction> automatic(const Plain& plain) {
+  return std::make_unique<ceres::AutoDiffCostFunction<Plain, kResiduals, kSizes...>>(new Plain(plain));
+}
+
 struct FactorSubject {
   std::string name;
   std::function<FactorScene(const SceneRequest&)> scene;
@@ -39,6 +45,7 @@ struct FactorSubject {
   double automatic_tolerance = 1e-10;  // relative to the largest entry of a block
   double ridders_tolerance = 1e-6;     // likewise; what differences across the model's kinks leave
   double whitening_slack = 0.0;        // of the covariance: what the noise model neglects knowingly
+  bool in_world = true;                // parameters and data refer to the world's frame
 };
 
 inline void PrintTo(const FactorSubject& subject, std::ostream* out) { *out << subject.name; }

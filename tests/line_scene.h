@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include <Eigen/Core>
@@ -17,6 +18,7 @@
 #include "estimator/factors/line_factors.h"
 #include "sim/frame_view.h"
 #include "sim/trajectory.h"
+#include "simulated_rig.h"
 
 namespace plumbline::testing {
 
@@ -36,7 +38,7 @@ struct LineView {
   estimator::SegmentVelocities velocities;
 };
 
-inline estimator::CameraModel line_model(const LineView& v) { return {v.camera, kLineSigmaPx, 9.81}; }
+inline estimator::CameraModel line_model(const LineView& v) { return {v.camera, kLineSigmaPx, kGravity}; }
 
 // The line through two points of the world, about its origin.
 inline std::optional<estimator::LineBlock> line_block(const Eigen::Vector3d& C, const Eigen::Vector3d& D,
@@ -44,53 +46,26 @@ inline std::optional<estimator::LineBlock> line_block(const Eigen::Vector3d& C, 
   return estimator::orthonormal_line(estimator::line_through(C - origin_W, D - origin_W));
 }
 
-// A camera that slides sideways at constant velocity (none: at rest): the image velocity of each point is constant,
-// which is what the timing model `feature_velocity` assumes.
-class SlidingCamera final : public sim::Trajectory {
- public:
-  SlidingCamera(const core::Pose& T_B_C, const core::Pose& start, const Eigen::Vector2d& velocity_C)
-      : start_(start), v_W_(start.q * (T_B_C.q * Eigen::Vector3d(velocity_C.x(), velocity_C.y(), 0.0))) {}
-
-  sim::Kinematics at(double t_s) const override {
-    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-    return {.T_W_B = {start_.q, start_.p + t_s * v_W_}, .v_W = v_W_, .a_W = zero, .omega_B = zero, .alpha_B = zero};
-  }
-
- private:
-  core::Pose start_;
-  Eigen::Vector3d v_W_;
-};
-
 // Frame stamped t_cam, state at the IMU sample nearest to t_cam + td + state_lag. The segment lies 2 to 5 m ahead.
-inline LineView line_view(const sim::Trajectory& trajectory, const core::RigCalibration& rig, std::uint64_t index,
-                          double state_lag_s) {
+inline LineView line_view(const sim::Trajectory& trajectory, const core::RigCalibration& rig,
+                          const core::PinholeCamera& camera, std::uint64_t index, double state_lag_s) {
   constexpr double kRateHz = 1000.0;
-  constexpr double kGravity = 9.81;
   const core::RandomStream random({19, index}, "line_scene");
+  const core::ImuBias bias{0.02 * random.normal3(0), 0.1 * random.normal3(1)};
   LineView s;
+  s.camera = camera;
   s.rig = rig;
-  s.state.bias = {0.02 * random.normal3(0), 0.1 * random.normal3(1)};
-  std::vector<core::ImuSample> samples;
-  for (int k = 0; k <= static_cast<int>(kRateHz); ++k) {
-    const double t_s = k / kRateHz;
-    const sim::Kinematics x = trajectory.at(t_s);
-    samples.push_back(
-        {core::to_ns(t_s), x.omega_B + s.state.bias.gyro_rad_s,
-         x.T_W_B.q.conjugate() * (x.a_W + Eigen::Vector3d(0.0, 0.0, kGravity)) + s.state.bias.accel_m_s2});
-  }
+  s.samples = exact_samples(trajectory, kRateHz, bias);
   // On a sample, so that td_k is td where there is no lag.
   const double s_middle = 0.5 + 0.001 * static_cast<double>(index % 7);
   const double t_cam_s = s_middle - rig.td_s;
   s.state_index = static_cast<std::size_t>(std::llround((s_middle + state_lag_s) * kRateHz));
-  const double s_k = core::to_seconds(samples[s.state_index].t_ns);
+  const double s_k = core::to_seconds((*s.samples)[s.state_index].t_ns);
   s.offset_s = t_cam_s - s_k;
   s.td_k_s = -s.offset_s;
-  const sim::Kinematics at_state = trajectory.at(s_k);
-  s.state.T_W_B = at_state.T_W_B;
-  s.state.v_W = at_state.v_W;
-  s.samples = std::make_shared<const std::vector<core::ImuSample>>(std::move(samples));
+  s.state = state_at(trajectory, s_k, bias);
 
-  const core::Pose T_W_C = at_state.T_W_B * rig.T_B_C;
+  const core::Pose T_W_C = s.state.T_W_B * rig.T_B_C;
   const sim::FrameView frame(trajectory, s.camera, s.rig, sim::half_angle_of_view_rad(s.camera), t_cam_s);
   for (std::uint64_t k = 0; k < 1000; ++k) {
     std::array<Eigen::Vector3d, 2> ends;
@@ -113,19 +88,13 @@ inline LineView line_view(const sim::Trajectory& trajectory, const core::RigCali
   throw std::logic_error("line_view: no segment is seen");
 }
 
-inline core::RigCalibration line_rig(double td_s, double readout_s) {
-  return {.T_B_C = {core::exp_quaternion(Eigen::Vector3d(0.02, -0.03, 0.01)) * Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5),
-                    {0.06, 0.02, -0.01}},
-          .td_s = td_s,
-          .readout_s = readout_s};
-}
-
 // Lively motion; the state up to 8 ms off the middle row.
-inline LineView handheld_line(std::uint64_t index, double readout_s = 0.03, double largest_lag_s = 0.008) {
+inline LineView handheld_line(std::uint64_t index, double readout_s = 0.03, double largest_lag_s = 0.008,
+                              core::DistortionModel lens = core::DistortionModel::kNone) {
   sim::TrajectoryConfig config;
   const auto trajectory = sim::make_trajectory(config, 2.0, {23, index});
   const double lag_s = largest_lag_s * (static_cast<double>(index % 5) - 2.0) / 2.0;
-  return line_view(*trajectory, line_rig(0.013, readout_s), index, lag_s);
+  return line_view(*trajectory, scene_rig(readout_s), scene_camera(lens), index, lag_s);
 }
 
 inline core::Pose scene_start(std::uint64_t index) {
@@ -133,14 +102,16 @@ inline core::Pose scene_start(std::uint64_t index) {
   return {core::exp_quaternion(random.normal3(0)), random.normal3(1)};
 }
 
-inline LineView sliding_line(std::uint64_t index) {
-  const core::RigCalibration rig = line_rig(0.013, 0.03);
-  return line_view(SlidingCamera(rig.T_B_C, scene_start(index), {0.5, -0.3}), rig, index, 0.0);
+inline LineView sliding_line(std::uint64_t index, core::DistortionModel lens = core::DistortionModel::kNone) {
+  const core::RigCalibration rig = scene_rig(0.03);
+  const SlidingMotion motion(rig.T_B_C, scene_start(index), {0.5, -0.3});
+  return line_view(motion, rig, scene_camera(lens), index, 0.0);
 }
 
-inline LineView still_line(std::uint64_t index) {
-  const core::RigCalibration rig = line_rig(0.0, 0.0);
-  return line_view(SlidingCamera(rig.T_B_C, scene_start(index), {0.0, 0.0}), rig, index, 0.0);
+inline LineView still_line(std::uint64_t index, core::DistortionModel lens = core::DistortionModel::kNone) {
+  const core::RigCalibration rig = scene_rig(0.0, 0.0);
+  const SlidingMotion motion(rig.T_B_C, scene_start(index), {0.0, 0.0});
+  return line_view(motion, rig, scene_camera(lens), index, 0.0);
 }
 
 }  // namespace plumbline::testing

@@ -1,38 +1,16 @@
-// Residuals as their headers state them, plainly and for any scalar: what automatic differentiation holds the analytic
-// factors against, in tests and benchmarks. Nothing here is shared with the factors but core/lie.h and the data.
+// Inertial and prior residuals as their headers state them, plainly and for any scalar: what automatic differentiation
+// holds the analytic factors against, in tests and benchmarks. Nothing here is shared with the factors but core/lie.h
+// and the data.
 #pragma once
 
-#include <memory>
-
 #include <Eigen/Core>
-#include <ceres/autodiff_cost_function.h>
 
 #include "core/lie.h"
 #include "core/state.h"
 #include "estimator/factors/preintegration.h"
+#include "plain_motion.h"
 
 namespace plumbline::testing {
-
-template <class T>
-using Vector2 = Eigen::Matrix<T, 2, 1>;
-using core::Matrix3;
-using core::Vector3;
-
-template <class T>
-struct PlainPose {
-  Vector3<T> p;
-  Eigen::Quaternion<T> q;
-  explicit PlainPose(const T* x) : p(x[0], x[1], x[2]), q(x[6], x[3], x[4], x[5]) {}
-};
-
-template <class T>
-struct PlainState : PlainPose<T> {
-  Vector3<T> v;
-  Vector3<T> b_g;
-  Vector3<T> b_a;
-  explicit PlainState(const T* x)
-      : PlainPose<T>(x), v(x[7], x[8], x[9]), b_g(x[10], x[11], x[12]), b_a(x[13], x[14], x[15]) {}
-};
 
 // estimator/factors/imu_factor.h
 struct PlainImuResidual {

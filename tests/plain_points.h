@@ -1,38 +1,21 @@
 // Point residuals as MATH states them, plainly and for any scalar; companion of plain_factors.h. Motion over the gap to
-// an observation is integrated sample by sample from the state, the row is found by iteration in double, and the
-// derivative of that implicit solution is left to one more Newton step in the scalar.
+// an observation is integrated sample by sample from the state (plain_motion.h), the row is found by iteration in
+// double, and the derivative of that implicit solution is left to one more Newton step in the scalar.
 #pragma once
 
-#include <cmath>
-#include <memory>
 #include <optional>
 #include <vector>
 
+#include <Eigen/Core>
+#include <Eigen/LU>
 #include <ceres/jet.h>
 
-#include "core/calibration.h"
-#include "core/measurements.h"
-#include "core/time.h"
+#include "core/camera.h"
 #include "estimator/factors/ray_chart.h"
-#include "plain_factors.h"
+#include "plain_camera.h"
+#include "plain_motion.h"
 
 namespace plumbline::testing {
-
-inline double value_of(double x) { return x; }
-template <class S, int N>
-S value_of(const ceres::Jet<S, N>& x) {
-  return x.a;
-}
-
-template <class T>
-Vector2<T> plain_pixel(const core::PinholeCamera& c, const Vector3<T>& q) {
-  return {T(c.fx_px) * q.x() / q.z() + T(c.cx_px), T(c.fy_px) * q.y() / q.z() + T(c.cy_px)};
-}
-
-template <class T>
-Vector3<T> plain_bearing(const core::PinholeCamera& c, const Vector2<T>& pixel) {
-  return {(pixel.x() - T(c.cx_px)) / T(c.fx_px), (pixel.y() - T(c.cy_px)) / T(c.fy_px), T(1)};
-}
 
 // r = S B (q/|q| - p/|p|) or (project(q) - project(p))/sigma, whitened about the observed pixel.
 struct PlainReduction {
@@ -73,67 +56,15 @@ struct PlainLandmark {
       : b(fixed ? Vector3<T>(fixed->cast<T>()) : Vector3<T>(x[0], x[1], T(1))), lambda(fixed ? x[0] : x[2]) {}
 };
 
-template <class T>
-struct PlainBody {
-  Eigen::Quaternion<T> q;
-  Vector3<T> p;
-};
-
 // q = R_c^T (R_j^T (R_i (R_c b + lambda t_c) + lambda (t_i - t_j)) - lambda t_c)
 template <class T>
-Vector3<T> plain_transfer(const PlainLandmark<T>& l, const PlainPose<T>& c, const PlainBody<T>& i,
-                          const PlainBody<T>& j) {
+Vector3<T> plain_transfer(const PlainLandmark<T>& l, const PlainPose<T>& c, const PlainPose<T>& i,
+                          const PlainPose<T>& j) {
   const Vector3<T> P_bi = c.q * l.b + l.lambda * c.p;
   const Vector3<T> P_w = i.q * P_bi + l.lambda * i.p;
   const Vector3<T> P_bj = j.q.conjugate() * (P_w - l.lambda * j.p);
   return c.q.conjugate() * (P_bj - l.lambda * c.p);
 }
-
-// A frame and the samples about its state.
-struct PlainFrame {
-  std::shared_ptr<const std::vector<core::ImuSample>> samples;
-  std::size_t state_index = 0;
-  double offset_s = 0.0;
-  double gravity_m_s2 = 9.81;
-
-  // The state carried by midpoint steps to the last sample before tau, and from there by a step of its own length, the
-  // samples linear within it.
-  template <class T>
-  PlainBody<T> at(const PlainState<T>& state, const T& tau) const {
-    const std::vector<core::ImuSample>& z = *samples;
-    const core::TimeNs t0 = z[state_index].t_ns;
-    const auto time = [&](std::size_t i) { return core::to_seconds(z[i].t_ns - t0); };
-    std::size_t last = state_index;
-    while (time(last) > value_of(tau)) --last;
-    while (last + 2 < z.size() && time(last + 1) <= value_of(tau)) ++last;
-
-    Eigen::Quaternion<T> R = state.q;
-    Vector3<T> v = state.v;
-    Vector3<T> p = state.p;
-    const Vector3<T> g(T(0), T(0), T(-gravity_m_s2));
-    const auto step = [&](const Vector3<T>& w, const Vector3<T>& f0, const Vector3<T>& f1, const T& dt) {
-      const Vector3<T> phi = w * dt;
-      const Eigen::Quaternion<T> R1 = R * core::exp_quaternion(phi);
-      const Vector3<T> a = T(0.5) * (R * f0 + R1 * f1) + g;
-      p += v * dt + a * (T(0.5) * dt * dt);
-      v += a * dt;
-      R = R1;
-    };
-    const auto rate = [&](std::size_t i) -> Vector3<T> { return z[i].gyro_rad_s.cast<T>() - state.b_g; };
-    const auto force = [&](std::size_t i) -> Vector3<T> { return z[i].accel_m_s2.cast<T>() - state.b_a; };
-    for (std::size_t i = state_index; i != last;) {
-      const std::size_t next = last > i ? i + 1 : i - 1;
-      step(T(0.5) * (rate(i) + rate(next)), force(i), force(next), T(time(next) - time(i)));
-      i = next;
-    }
-    const T u = tau - T(time(last));
-    const T share = u / T(time(last + 1) - time(last));
-    const Vector3<T> w_end = rate(last) + share * (rate(last + 1) - rate(last));
-    const Vector3<T> f_end = force(last) + share * (force(last + 1) - force(last));
-    step(T(0.5) * (rate(last) + w_end), force(last), f_end, u);
-    return {R, p};
-  }
-};
 
 // estimator/factors/point_factors.h
 struct PlainPropagatedPoint {
@@ -184,8 +115,8 @@ struct PlainPropagatedPoint {
     if (anchor_pixel) fixed = plain_bearing<double>(reduction.camera, *anchor_pixel);
     const PlainLandmark<T> l(x_l, fixed);
     const T anchor_row = plain_pixel(reduction.camera, l.b).y();
-    const PlainBody<T> i = anchor.at(PlainState<T>(x_i), tau(anchor, *td, *readout, anchor_row));
-    const PlainBody<T> j = observer.at(PlainState<T>(x_j), tau(observer, *td, *readout, row));
+    const PlainPose<T> i = anchor.at(PlainState<T>(x_i), tau(anchor, *td, *readout, anchor_row));
+    const PlainPose<T> j = observer.at(PlainState<T>(x_j), tau(observer, *td, *readout, row));
     return plain_transfer(l, PlainPose<T>(x_c), i, j);
   }
 
@@ -225,9 +156,7 @@ struct PlainFeatureVelocityPoint {
                   T* residual) const {
     PlainLandmark<T> l(x_l, anchor ? std::optional(Eigen::Vector3d(Eigen::Vector3d::UnitZ())) : std::nullopt);
     if (anchor) l.b = anchor->at(*td, *readout);
-    const PlainState<T> i(x_i);
-    const PlainState<T> j(x_j);
-    const Vector3<T> q = plain_transfer(l, PlainPose<T>(x_c), PlainBody<T>{i.q, i.p}, PlainBody<T>{j.q, j.p});
+    const Vector3<T> q = plain_transfer(l, PlainPose<T>(x_c), PlainPose<T>(x_i), PlainPose<T>(x_j));
     Eigen::Map<Vector2<T>> r(residual);
     r = reduction(q, observed.at(*td, *readout));
     return true;

@@ -5,21 +5,26 @@
 #include <gtest/gtest.h>
 
 #include "factor_laws.h"
+#include "imu_subjects.h"
 #include "point_subjects.h"
 
 namespace plumbline::testing {
 INSTANTIATE_TEST_SUITE_P(Points, FactorLaws, ::testing::ValuesIn(point_subjects()), subject_name);
+INSTANTIATE_TEST_SUITE_P(Points, WorldFrameLaws, ::testing::ValuesIn(in_world(point_subjects())), subject_name);
 }  // namespace plumbline::testing
 
 namespace plumbline::estimator {
 namespace {
 
+using core::DistortionModel;
 using testing::Block;
-using testing::block;
+using testing::FactorScene;
 using testing::kGravity;
-using testing::kPoseManifold;
 using testing::kSigmaPx;
-using testing::kStateManifold;
+using testing::pose_block;
+using testing::scalar_block;
+using testing::scene_views;
+using testing::state_block;
 
 using Fixed = FeatureVelocityPoint<LandmarkType::kFixedBearing>;
 
@@ -34,12 +39,8 @@ struct HandWorked {
   HandWorked() {
     core::State observer;
     observer.T_W_B.p = {1.0, 0.0, 0.0};
-    blocks = {block(pack(core::State{}), &kStateManifold),
-              block(pack(observer), &kStateManifold),
-              block(pack(core::Pose{}), &kPoseManifold),
-              testing::scalar_block(0.0),
-              testing::scalar_block(0.0),
-              testing::scalar_block(0.25)};
+    blocks = {state_block(core::State{}), state_block(observer), pose_block(core::Pose{}),
+              scalar_block(0.0),          scalar_block(0.0),     scalar_block(0.25)};
   }
 };
 
@@ -70,9 +71,7 @@ TEST(HandWorkedVector, UnitSphere) {
 // Of the same vector by the trajectory: a rig at rest has no timing, so both models are one.
 TEST(HandWorkedVector, Propagated) {
   const HandWorked h;
-  std::vector<core::ImuSample> rest;
-  for (int i = 0; i <= 20; ++i) rest.push_back({core::to_ns(0.005 * i), {0, 0, 0}, {0, 0, kGravity}});
-  const auto motion = std::make_shared<LocalMotion>(rest, 10, 0.05, core::ImuBias{});
+  const auto motion = std::make_shared<LocalMotion>(testing::samples_at_rest(21, 0.005), 10, 0.05, core::ImuBias{});
   const PropagatedPoint<LandmarkType::kFixedBearing> factor({h.camera, 1.0, kGravity}, {motion, 0.0}, {motion, 0.0},
                                                             {0.3, 0.2}, {0.5, 0.25});
   expect_vector(testing::residual(factor, h.blocks), -0.05, 0.05);
@@ -129,11 +128,59 @@ TEST(MovingBearing, IsCarriedBackAlongItsVelocity) {
   EXPECT_NEAR(last_row.at(0.01, 0.03).x(), -0.4 * 0.015, 1e-15);
 }
 
+// An observation so far off the true pixel; the blocks are at the truth.
+FactorScene propagated(std::uint64_t scene, const Eigen::Vector2d& offset_px = Eigen::Vector2d::Zero()) {
+  const testing::Variant variant{ResidualType::kPinhole, LandmarkType::kBearingInverseDepth};
+  const testing::TwoViews& s = scene_views(testing::Motion::kHandheld, DistortionModel::kNone, scene, false);
+  return testing::propagated_scene(s, variant,
+                                   testing::blocks_of(s, variant, testing::true_landmark(s, testing::propagated_scene)),
+                                   s.observer.pixel + offset_px);
+}
+
+bool evaluates(const FactorScene& s) {
+  Eigen::Vector2d r;
+  return s.factor->Evaluate(testing::pointers(s.blocks).data(), r.data(), nullptr);
+}
+
+// The laws have tables at the states' own biases. Elsewhere the first-order correction takes part.
+TEST(PropagatedPointFactor, JacobiansHoldAwayFromTheBiasesOfTheTables) {
+  for (std::uint64_t i = 0; i < 8; ++i) {
+    FactorScene s = propagated(i);
+    for (const std::size_t k : {0U, 1U}) testing::displace(s.blocks[k], 0.02, testing::kPointRandom, 3000 + i, k);
+    for (const std::size_t k : {0U, 1U}) testing::expect_jacobian(*s.factor, s.blocks, k, 1e-3, 1e-6);
+  }
+}
+
+// The row is the predicted one: noise in the measured row moves the residual by exactly as much and nothing else.
+TEST(PropagatedPointFactor, TheMeasuredRowIsNotATime) {
+  const FactorScene before = propagated(3);
+  const FactorScene after = propagated(3, {0.0, 3.0});
+  const Eigen::VectorXd change =
+      testing::residual(*after.factor, after.blocks) - testing::residual(*before.factor, before.blocks);
+  EXPECT_NEAR(change.x(), 0.0, 1e-9);
+  EXPECT_NEAR(change.y(), -3.0 / kSigmaPx, 1e-9);
+}
+
+TEST(PropagatedPointFactor, BehindTheObserverIsFalse) {
+  FactorScene s = propagated(2);
+  EXPECT_TRUE(evaluates(s));
+  core::State turned = unpack_state(s.blocks[1].values.data());
+  turned.T_W_B.q = turned.T_W_B.q * core::exp_quaternion(Eigen::Vector3d(0, 0, 3.0));
+  s.blocks[1] = state_block(turned);
+  EXPECT_FALSE(evaluates(s));
+}
+
+TEST(PropagatedPointFactor, LeavingTheTableIsFalse) {
+  FactorScene s = propagated(2);
+  s.blocks[3] = scalar_block(0.5);
+  EXPECT_FALSE(evaluates(s));
+}
+
 // The sideways scene obeys both timing models; in a scene that turns, the image velocity is not constant and its model
 // is off by half the image acceleration times the square of the shift.
 TEST(FeatureVelocity, ItsErrorIsQuadraticInTheShift) {
   const testing::Variant variant{ResidualType::kPinhole, LandmarkType::kBearingInverseDepth};
-  const testing::TwoViews& s = testing::scene_views(testing::Motion::kHandheld, 3, true, 0.0);
+  const testing::TwoViews& s = scene_views(testing::Motion::kHandheld, DistortionModel::kNone, 3, true, 0.0);
   const auto error_px = [&](double shift_s) {
     // The state lies shift_s before the exposure.
     testing::TwoViews moved = s;
@@ -146,7 +193,7 @@ TEST(FeatureVelocity, ItsErrorIsQuadraticInTheShift) {
         sim::make_trajectory(c, 1.0, {43, 0})->at(core::to_seconds((*s.samples)[moved.observer.state_index].t_ns));
     moved.observer.state.T_W_B = x.T_W_B;
     const Eigen::Vector3d landmark = testing::true_landmark(moved, testing::feature_velocity_scene);
-    const testing::FactorScene scene = testing::feature_velocity_scene(
+    const FactorScene scene = testing::feature_velocity_scene(
         moved, variant, testing::blocks_of(moved, variant, landmark), moved.observer.pixel);
     return kSigmaPx * testing::residual(*scene.factor, scene.blocks).norm();
   };

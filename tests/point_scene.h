@@ -2,39 +2,22 @@
 // (closed forms of the simulator) unless noise is asked for.
 #pragma once
 
+#include <cmath>
 #include <memory>
-#include <numbers>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 
 #include "core/measurements.h"
 #include "core/random.h"
 #include "core/time.h"
-#include "estimator/factors/local_motion.h"
 #include "sim/frame_view.h"
 #include "sim/trajectory.h"
+#include "simulated_rig.h"
 
 namespace plumbline::testing {
-
-// A camera that slides sideways at constant velocity: the image velocity of each landmark is constant, which is what
-// the timing model `feature_velocity` assumes.
-class SidewaysMotion final : public sim::Trajectory {
- public:
-  SidewaysMotion(const core::Pose& T_B_C, double yaw_rad, const Eigen::Vector2d& velocity_C)
-      : q_(core::exp_quaternion(Eigen::Vector3d(0.1, -0.2, yaw_rad))),
-        v_W_(q_ * (T_B_C.q * Eigen::Vector3d(velocity_C.x(), velocity_C.y(), 0.0))) {}
-
-  sim::Kinematics at(double t_s) const override {
-    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-    return {.T_W_B = {q_, t_s * v_W_}, .v_W = v_W_, .a_W = zero, .omega_B = zero, .alpha_B = zero};
-  }
-
- private:
-  Eigen::Quaterniond q_;
-  Eigen::Vector3d v_W_;
-};
 
 struct SceneView {
   double t_cam_s = 0.0;
@@ -57,35 +40,16 @@ struct TwoViews {
   SceneView observer;
 };
 
-inline core::RigCalibration scene_rig(double readout_s) {
-  return {.T_B_C = {core::exp_quaternion(Eigen::Vector3d(0.02, -0.03, 0.01)) * Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5),
-                    {0.06, 0.02, -0.01}},
-          .td_s = 0.013,
-          .readout_s = readout_s};
-}
-
 // Scene `index` of a trajectory: a landmark 2 to 6 m ahead, frames 0.3 s apart, states at the samples (200 Hz or what
 // rate_hz says) some milliseconds off the middle rows.
-inline TwoViews two_views(const sim::Trajectory& trajectory, const core::RigCalibration& rig, std::uint64_t index,
-                          double rate_hz) {
-  constexpr double kGravity = 9.81;
+inline TwoViews two_views(const sim::Trajectory& trajectory, const core::RigCalibration& rig,
+                          const core::PinholeCamera& camera, std::uint64_t index, double rate_hz) {
   const core::RandomStream random({17, index}, "point_scene");
-  TwoViews s{.camera = {}, .rig = rig, .samples = nullptr, .anchor = {}, .observer = {}};
   const core::ImuBias bias{0.02 * random.normal3(0), 0.1 * random.normal3(1)};
-
-  std::vector<core::ImuSample> samples;
-  for (int k = 0; k <= static_cast<int>(rate_hz); ++k) {
-    const double t_s = k / rate_hz;
-    const sim::Kinematics x = trajectory.at(t_s);
-    samples.push_back({core::to_ns(t_s), x.omega_B + bias.gyro_rad_s,
-                       x.T_W_B.q.conjugate() * (x.a_W + Eigen::Vector3d(0.0, 0.0, kGravity)) + bias.accel_m_s2});
-  }
+  TwoViews s{
+      .camera = camera, .rig = rig, .samples = exact_samples(trajectory, rate_hz, bias), .anchor = {}, .observer = {}};
 
   const double t_anchor_s = 0.25 + 0.1 * random.uniform(2);
-  const auto state_at = [&](double t_s) -> core::State {
-    const sim::Kinematics x = trajectory.at(t_s);
-    return {.T_W_B = x.T_W_B, .v_W = x.v_W, .bias = bias};
-  };
   const auto view = [&](double t_cam_s, const Eigen::Vector3d& P_W) -> std::optional<SceneView> {
     const sim::FrameView frame(trajectory, s.camera, rig, sim::half_angle_of_view_rad(s.camera), t_cam_s);
     const auto exposure = frame.expose(P_W);
@@ -93,9 +57,9 @@ inline TwoViews two_views(const sim::Trajectory& trajectory, const core::RigCali
     SceneView v{.t_cam_s = t_cam_s};
     const double state_s = t_cam_s + rig.td_s + 0.012 * (random.uniform(3, t_cam_s > t_anchor_s ? 1 : 0) - 0.5);
     v.state_index = static_cast<std::size_t>(std::llround(state_s * rate_hz));
-    const double s_k = core::to_seconds(samples[v.state_index].t_ns);
+    const double s_k = core::to_seconds((*s.samples)[v.state_index].t_ns);
     v.offset_s = t_cam_s - s_k;
-    v.state = state_at(s_k);
+    v.state = state_at(trajectory, s_k, bias);
     v.pixel = exposure->pixel;
     v.velocity = frame.image_velocity(P_W, exposure->t_imu_s);
     v.bearing = s.camera.unproject(v.pixel);
@@ -116,7 +80,6 @@ inline TwoViews two_views(const sim::Trajectory& trajectory, const core::RigCali
     if (!anchor || !observer) continue;
     s.anchor = *anchor;
     s.observer = *observer;
-    s.samples = std::make_shared<const std::vector<core::ImuSample>>(std::move(samples));
     return s;
   }
   throw std::logic_error("two_views: no landmark is seen twice");
