@@ -44,7 +44,7 @@ inline std::optional<Eigen::Vector2d> project_bal(const BalIntrinsics& camera, V
   const double r2 = x * x + y * y;
   const double d = 1.0 + r2 * (camera.k1 + camera.k2 * r2);
   const double f = camera.f_px;
-  const Eigen::Vector2d pixel(f * d * x, f * d * y);
+  Eigen::Vector2d pixel(f * d * x, f * d * y);
   if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
   if (J_P != nullptr) {
     const double g2 = 2.0 * (camera.k1 + 2.0 * camera.k2 * r2);  // 2 g, g = dd/dr2

@@ -85,7 +85,7 @@ std::optional<Eigen::Vector2d> step_to_foot(const Scene& scene, const LineEndPoi
   foot.distance_px = (chain.n_c.dot(b) - gradient.dot(foot.offset_px)) / foot.gradient_norm;
   if (!std::isfinite(foot.distance_px)) return std::nullopt;
   const Eigen::Vector2d offset_px = gradient * (-foot.distance_px / foot.gradient_norm);
-  const Eigen::Vector2d change = offset_px - foot.offset_px;
+  Eigen::Vector2d change = offset_px - foot.offset_px;
   foot.offset_px = offset_px;
   return change;
 }
