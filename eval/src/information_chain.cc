@@ -1,6 +1,7 @@
 #include "eval/information_chain.h"
 
 #include <algorithm>
+#include <ranges>
 #include <stdexcept>
 #include <unordered_map>
 
@@ -138,20 +139,20 @@ std::vector<Eigen::MatrixXd> InformationChain::marginals() const {
   std::vector<Eigen::MatrixXd> result(dofs_.size());
   std::unordered_map<Variable, int> place;  // of a variable in Sigma
   Eigen::MatrixXd Sigma;
-  for (auto c = conditionals_.rbegin(); c != conditionals_.rend(); ++c) {
+  for (const Conditional& c : std::views::reverse(conditionals_)) {
     std::vector<int> S;
-    for (const Variable v : c->separator) {
+    for (const Variable v : c.separator) {
       for (int i = 0; i < dof(v); ++i) S.push_back(place.at(v) + i);
     }
     const Eigen::MatrixXd Sigma_SS = select(Sigma, S, S);
-    const auto f = c->A.rows();
-    const auto s = c->A.cols();
+    const auto f = c.A.rows();
+    const auto s = c.A.cols();
     Eigen::MatrixXd next(f + s, f + s);
-    const Eigen::MatrixXd own = c->H_FF.matrixL().solve(Eigen::MatrixXd::Identity(f, f));
+    const Eigen::MatrixXd own = c.H_FF.matrixL().solve(Eigen::MatrixXd::Identity(f, f));
     next.topLeftCorner(f, f) = own.transpose() * own;
     if (s > 0) {
-      const Eigen::MatrixXd ASigma = c->A * Sigma_SS;
-      next.topLeftCorner(f, f) += ASigma * c->A.transpose();
+      const Eigen::MatrixXd ASigma = c.A * Sigma_SS;
+      next.topLeftCorner(f, f) += ASigma * c.A.transpose();
       next.topRightCorner(f, s) = -ASigma;
       next.bottomLeftCorner(s, f) = -ASigma.transpose();
       next.bottomRightCorner(s, s) = Sigma_SS;
@@ -160,12 +161,12 @@ std::vector<Eigen::MatrixXd> InformationChain::marginals() const {
 
     place.clear();
     int at = 0;
-    for (const Variable v : c->frontal) {
+    for (const Variable v : c.frontal) {
       result[static_cast<std::size_t>(v)] = Sigma.block(at, at, dof(v), dof(v));
       place[v] = at;
       at += dof(v);
     }
-    for (const Variable v : c->separator) {
+    for (const Variable v : c.separator) {
       place[v] = at;
       at += dof(v);
     }
@@ -181,10 +182,10 @@ Eigen::MatrixXd InformationChain::solve(const Eigen::MatrixXd& B) const {
     const std::vector<int> S = rows_of(c.separator);
     assign_rows(select_rows(x, S) - c.A.transpose() * select_rows(x, rows_of(c.frontal)), S, x);
   }
-  for (auto c = conditionals_.rbegin(); c != conditionals_.rend(); ++c) {
-    const std::vector<int> F = rows_of(c->frontal);
-    Eigen::MatrixXd x_F = c->H_FF.solve(select_rows(x, F));
-    if (!c->separator.empty()) x_F -= c->A * select_rows(x, rows_of(c->separator));
+  for (const Conditional& c : std::views::reverse(conditionals_)) {
+    const std::vector<int> F = rows_of(c.frontal);
+    Eigen::MatrixXd x_F = c.H_FF.solve(select_rows(x, F));
+    if (!c.separator.empty()) x_F -= c.A * select_rows(x, rows_of(c.separator));
     assign_rows(x_F, F, x);
   }
   return x;

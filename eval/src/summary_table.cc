@@ -66,8 +66,9 @@ void append_metric(std::string& out, const MetricSummary& m, bool bound_column) 
     return bound_column ? fmt::format("{:>6} {}", ratio, nees) : nees;
   };
   if (!info.in_table) {
-    if (m.nees)
+    if (m.nees) {
       fmt::format_to(std::back_inserter(out), fmt::runtime(kRow), info.label, "", "", "", "", last_columns(""));
+    }
     return;
   }
   const double reference = m.rmse * info.table_unit;
