@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -60,8 +61,13 @@ class ProgramTest : public ::testing::Test {
     return text.str();
   }
 
+  static void save(const std::filesystem::path& path, const std::string& text) {
+    std::ofstream(path, std::ios::binary) << text;
+  }
+
+  // In the folder; returns where.
   std::filesystem::path write(const std::filesystem::path& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
+    save(folder_ / name, text);
     return folder_ / name;
   }
 

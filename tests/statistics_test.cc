@@ -3,34 +3,28 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
-#include <random>
 #include <stdexcept>
 #include <vector>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "core/random.h"
 #include "eval/anees.h"
 #include "eval/nees.h"
 
 namespace plumbline::eval {
 namespace {
 
-// Standard normal by Box-Muller: std::normal_distribution differs between libraries.
+// Standard normal numbers, one after the other.
 class Gaussian {
  public:
-  explicit Gaussian(std::uint64_t seed) : bits_(seed) {}
-
-  double operator()() {
-    const double u = uniform();
-    return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * std::numbers::pi * uniform());
-  }
+  explicit Gaussian(std::uint64_t seed) : stream_({seed, 0}, "statistics_test") {}
+  double operator()() { return stream_.normal(drawn_++); }
 
  private:
-  double uniform() { return (static_cast<double>(bits_() >> 11U) + 0.5) * 0x1p-53; }
-
-  std::mt19937_64 bits_;
+  core::RandomStream stream_;
+  std::uint64_t drawn_ = 0;
 };
 
 TEST(Statistics, ByHand) {

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/physical_ranges.h"
 #include "core/resolved_config.h"
 #include "estimator/estimate.h"
 #include "sim/imu_sensor.h"
@@ -187,10 +188,11 @@ void check_cell(const Experiment& e) {
     const core::ImuNoise& imu = e.scenario.imu.noise;
     const double least = std::min({imu.gyro_noise_density, imu.gyro_bias_walk, imu.accel_noise_density,
                                    imu.accel_bias_walk, e.scenario.camera.pixel_sigma_px});
-    if (!(least > 0.0)) {
+    if (!(least >= core::kLeastSigma)) {
       throw core::ConfigError(
-          "eval.crlb: needs noise: scenario.camera.pixel_sigma_px and the four noises of "
-          "scenario.imu must be > 0");
+          fmt::format("eval.crlb: needs noise: scenario.camera.pixel_sigma_px and the four noises of scenario.imu must "
+                      "be >= {}",
+                      core::kLeastSigma));
     }
   }
   check_scenario(e.scenario, {e.experiment.seed, 0});

@@ -1,6 +1,7 @@
 #include "estimator/factors/bal_factors.h"
 
 #include "core/lie.h"
+#include "estimator/factors/skew_product.h"
 
 namespace plumbline::estimator {
 namespace {
@@ -10,13 +11,6 @@ template <int Columns>
 using Rows2 = Eigen::Matrix<double, 2, Columns, Eigen::RowMajor>;
 
 core::BalIntrinsics intrinsics_at(const double* x) { return {x[0], x[1], x[2]}; }
-
-// a [b]x for a row vector a: (a x b)^T.
-RowPair3 times_skew(const RowPair3& A, const Eigen::Vector3d& b) {
-  RowPair3 J;
-  for (int i = 0; i < 2; ++i) J.row(i) = A.row(i).cross(b.transpose());
-  return J;
-}
 
 // d Exp(d) * q / d d at d = 0; rows x, y, z, w.
 Eigen::Matrix<double, 4, 3> left_plus_jacobian(const Eigen::Quaterniond& q) {

@@ -54,7 +54,8 @@ struct BoundOptions {
 };
 
 // What the IMU would have measured at the stamps of the log without white noise and defects, the true biases included:
-// central differences of the true orientations and velocities at the neighbouring stamps, exact to second order.
+// central differences of the true orientations and velocities at the neighbouring stamps, exact to second order; at the
+// two ends, where there is one neighbour, to first.
 std::vector<core::ImuSample> noise_free_imu(const core::MeasurementLog& log, const sim::GroundTruth& truth);
 
 // Needs positive noise densities and pixel noise. Throws std::domain_error where the information is singular.

@@ -1,9 +1,8 @@
 // The trials of one cell in a few figures. Figures are over the trials that are ok; n counts all of them.
 //   mean, median (signed where the quantity is), rmse = sqrt(mean of squares), std of the sample
 //   mean_ci95   Student's t, of signed quantities: their bias
-//   rmse_ci95   exact for signed Gaussian errors, else from kLogarithmTrials on by rms_interval (eval/statistics.h),
-//   from
-//               kBootstrapTrials on by BCa (eval/bootstrap.h), from 10,000 on, where all agree, by rms_interval again
+//   rmse_ci95   exact for signed Gaussian errors; else none below 20 trials, then by rms_interval (eval/statistics.h),
+//               from kBootstrapTrials on by BCa (eval/bootstrap.h), from 10,000 on, where all agree, by the first again
 //   q05, q95    empirical quantiles
 //   nees_mean   not divided by the degrees of freedom, and the 95 % band of that mean over n consistent trials
 //   within_3_sigma  share of trials in the 99.73 % region of the stated covariance, NEES <= chi2inv(0.9973, dof), for
