@@ -196,7 +196,7 @@ TEST(Planes, WithoutRoomAreRefused) {
   try {
     make_world(scenario, *trajectory, kId);
     FAIL() << "found a place";
-  } catch (const core::DataError& error) {
+  } catch (const core::RuleError& error) {
     EXPECT_THAT(error.what(), testing::StartsWith("scenario.world.planes: no place for plane 1"));
   }
 }

@@ -17,8 +17,8 @@ namespace {
 // What the estimator divides by.
 void require_weight(double value, std::string_view key, std::string_view meaning) {
   if (!(value >= core::kLeastSigma)) {
-    throw core::ConfigError(
-        fmt::format("{}: must be >= {} for the estimator ({} is {})", key, core::kLeastSigma, meaning, value));
+    throw core::RuleError({std::string(key), fmt::format("must be >= {} for the estimator ({} is {})",
+                                                         core::kLeastSigma, meaning, value)});
   }
 }
 

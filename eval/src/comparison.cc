@@ -15,7 +15,6 @@
 namespace plumbline::eval {
 namespace {
 
-constexpr double kConfidence = 0.95;
 constexpr double kPower = 0.8;
 
 using Key = std::pair<std::uint64_t, int>;  // seed, trial

@@ -16,7 +16,6 @@
 namespace plumbline::eval {
 namespace {
 
-constexpr double kConfidence = 0.95;
 constexpr double kThreeSigma = 0.9973002039367398;  // of a Gaussian within three standard deviations
 constexpr int kLogarithmTrials = 20;                // with fewer rms_interval covers too seldom
 constexpr int kAllAgree = 10'000;                   // trials, at which resampling would only take long

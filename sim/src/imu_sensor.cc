@@ -83,10 +83,11 @@ ImuRecording simulate_imu(const Trajectory& trajectory, const ImuConfig& config,
           {.t_ns = stamp_ns, .gyro_rad_s = read_out(config.gyro, w_m), .accel_m_s2 = read_out(config.accel, a_m)});
     }
     if (!missing[i] && !core::is_physical(recording.samples.back())) {
-      throw core::DataError(fmt::format(
-          "scenario: at {} s the IMU would read more than {} rad/s or {} m/s^2; scenario.trajectory must be "
-          "slower, or the errors of scenario.imu smaller",
-          core::to_seconds(t_ns), core::kMostGyroReadingRadS, core::kMostAccelReadingMS2));
+      throw core::RuleError(
+          {"scenario.trajectory",
+           fmt::format("must be slower, or the errors of scenario.imu smaller: at {} s the IMU would read more than {} "
+                       "rad/s or {} m/s^2",
+                       core::to_seconds(t_ns), core::kMostGyroReadingRadS, core::kMostAccelReadingMS2)});
     }
     recording.stamps_ns.push_back(stamp_ns);
     recording.biases.push_back(bias);

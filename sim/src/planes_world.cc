@@ -48,9 +48,9 @@ World planes_world(const ScenarioConfig& scenario, const Trajectory& trajectory,
   for (int i = 0; i < config.planes.count; ++i) {
     for (std::uint64_t draw = 0;; ++draw) {
       if (draw == kMostDraws) {
-        throw core::DataError(
-            fmt::format("scenario.world.planes: no place for plane {} that is walls.clearance_m = {} m from the path",
-                        i + 1, config.walls.clearance_m));
+        throw core::RuleError({"scenario.world.planes",
+                               fmt::format("no place for plane {} that is walls.clearance_m = {} m from the path",
+                                           i + 1, config.walls.clearance_m)});
       }
       const auto place = stream.uniforms(static_cast<std::uint64_t>(i), 2 * draw);
       const auto turn = stream.uniforms(static_cast<std::uint64_t>(i), 2 * draw + 1);

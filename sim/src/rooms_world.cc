@@ -83,10 +83,11 @@ void require_few_rooms(const House& house, double longest_side_m) {
   const Eigen::Vector3d size_m = house.box.sizes();
   const double rooms = std::ceil(size_m.x() / longest_side_m) * std::ceil(size_m.y() / longest_side_m);
   if (rooms <= kMostRooms) return;
-  throw core::DataError(fmt::format(
-      "scenario.world.rooms.longest_side_m: must be larger, or the margin and the path smaller: {} m divide "
-      "a house of {:.0f} m x {:.0f} m into {} rooms, at most {} are built",
-      longest_side_m, size_m.x(), size_m.y(), rooms, kMostRooms));
+  throw core::RuleError(
+      {"scenario.world.rooms.longest_side_m",
+       fmt::format("must be larger, or the margin and the path smaller: {} m divide a house of {:.0f} m x {:.0f} m "
+                   "into {} rooms, at most {} are built",
+                   longest_side_m, size_m.x(), size_m.y(), rooms, kMostRooms)});
 }
 
 House house_about(const std::vector<Eigen::Vector3d>& path_W, const WorldConfig& config) {

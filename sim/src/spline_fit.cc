@@ -55,10 +55,10 @@ std::vector<Sample> samples_in_span(const std::vector<core::StampedPose>& poses,
     // The gap before this pose counts if any of it lies in the span, even where neither of its poses does.
     const double gap_s = i == segment.first ? 0.0 : seconds_between(poses[i - 1], poses[i]);
     if (gap_s > config.largest_gap_s && t > begin_s && t - gap_s < end_s) {
-      throw core::DataError(
-          fmt::format("{}: gap of {:.3f} s between the poses at {:.3f} s and {:.3f} s after the first; "
-                      "scenario.trajectory.largest_gap_s is {}, and on_gap: longest_segment uses a piece without",
-                      config.file.generic_string(), gap_s, since_first_s - gap_s, since_first_s, config.largest_gap_s));
+      throw core::DataError(fmt::format(
+          "{}: gap of {:.3f} s between the poses at {:.3f} s and {:.3f} s after the first; "
+          "scenario.trajectory.largest_gap_s is {}; another start_s, or on_gap: longest_segment, uses a piece without",
+          config.file.generic_string(), gap_s, since_first_s - gap_s, since_first_s, config.largest_gap_s));
     }
     if (t >= begin_s && t <= end_s) samples.push_back({t, poses[i].T_W_B});
   }

@@ -107,8 +107,10 @@ void visit(core::ConfigVisitor& v, TrajectoryConfig& c) {
   v.value("knot_interval_s", c.knot_interval_s, between(0.01, 100.0),
           "`spline`: wider smooths more, in the file's time; interpolated measurement noise would fake excitation");
   v.value("largest_gap_s", c.largest_gap_s, core::positive(), "`spline`: a wider one between poses is a gap");
-  v.choice("on_gap", c.on_gap, kOnGapNames,
-           "`spline`: gaps are refused, or start_s counts from the longest piece of the file without one");
+  v.choice(
+      "on_gap", c.on_gap, kOnGapNames,
+      "`spline`: a gap within the used span is refused (start_s may choose another piece), or start_s counts from the "
+      "longest piece of the file without one");
   v.value("speed_up", c.speed_up, between(1e-3, 1e3),
           "`spline`: the path travelled so many times faster; speed and rate grow as it, accelerations as its square");
 }

@@ -18,9 +18,8 @@ std::vector<Eigen::Vector3d> scatter_on(const std::vector<Wall>& faces, int land
   for (int i = 0; i < landmarks; ++i) {
     for (std::uint64_t draw = 0;; ++draw) {
       if (draw == kMostDraws) {
-        throw core::DataError(
-            "scenario.world: the walls have hardly any area for landmarks; doors and walls.clearance_m must be "
-            "smaller");
+        throw core::RuleError({"scenario.world.walls.clearance_m",
+                               "must be smaller, or the doors: the walls have hardly any area for landmarks"});
       }
       const auto u = stream.uniforms(static_cast<std::uint64_t>(i), draw);
       const auto above = std::upper_bound(area_up_to.begin() + 1, area_up_to.end() - 1, u[0] * area_up_to.back());

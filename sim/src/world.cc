@@ -28,7 +28,7 @@ constexpr std::array<WorldMaker, kWorldTypeNames.size()> kWorldMakers = {{{World
 void refuse_path_through_walls(const Walls& walls, const std::vector<Eigen::Vector3d>& path_W) {
   for (std::size_t i = 1; i < path_W.size(); ++i) {
     if (walls.occluded(path_W[i - 1], path_W[i])) {
-      throw core::DataError("scenario.world: the path passes through a wall; walls.clearance_m must be larger");
+      throw core::RuleError({"scenario.world.walls.clearance_m", "must be larger: the path passes through a wall"});
     }
   }
 }
@@ -51,8 +51,8 @@ Path sample_path(const ScenarioConfig& scenario, const Trajectory& trajectory) {
     path.body_W.push_back(T_W_B.p);
     path.camera_W.push_back(T_W_B * calibration.T_B_C.p);
     if (!(path.camera_W.back().array().abs() <= core::kMostPathM).all()) {
-      throw core::DataError(
-          fmt::format("scenario.trajectory: must stay within {} m for a world about its path", core::kMostPathM));
+      throw core::RuleError(
+          {"scenario.trajectory", fmt::format("must stay within {} m for a world about its path", core::kMostPathM)});
     }
   }
   return path;
@@ -101,9 +101,9 @@ World frustum_world(const ScenarioConfig& scenario, const Trajectory& trajectory
   for (int i = 0; i < config.landmarks; ++i) {
     for (std::uint64_t draw = 0;; ++draw) {
       if (draw == kMostDraws) {
-        throw core::DataError(
-            "scenario.camera.distortion_coefficients: hardly any pixel has a ray for `frustum` to draw from; the "
-            "distortion must be weaker, or scenario.world.type another");
+        throw core::RuleError({"scenario.camera.distortion_coefficients",
+                               "must be weaker, or scenario.world.type another: hardly any pixel has a ray for "
+                               "`frustum` to draw from"});
       }
       const auto u = stream.uniforms(static_cast<std::uint64_t>(i), draw);
       const auto ray = camera.try_unproject({u[1] * camera.width_px - 0.5, u[2] * camera.height_px - 0.5});

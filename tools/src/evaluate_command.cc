@@ -132,7 +132,7 @@ class RunTable {
     fmt::print("\n{}/{} ok\n", position_m_.size(), n);
     if (position_m_.empty()) return;
     const auto line = [](const char* name, const std::vector<double>& values) {
-      const auto interval = eval::rms_interval(values, 0.95);
+      const auto interval = eval::rms_interval(values, eval::kConfidence);
       fmt::print("{}: median {:.6f}, rmse over runs {:.6f}{}\n", name, eval::median(values),
                  eval::root_mean_square(values),
                  interval ? fmt::format(" [{:.6f}, {:.6f}] (95 %)", interval->lo, interval->hi) : "");

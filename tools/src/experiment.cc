@@ -110,6 +110,18 @@ std::vector<Axis> take_axes(ConfigTree& root) {
   return axes;
 }
 
+// Names the place of the key, or of the innermost section that would hold it.
+core::ConfigError located(const ConfigTree& root, const core::RuleViolation& violation) {
+  for (std::string_view key = violation.key;;) {
+    if (const ConfigTree* value = core::find_value(root, key)) {
+      return core::config_error(value->origin, violation.key, violation.rule);
+    }
+    const std::size_t dot = key.rfind('.');
+    if (dot == std::string_view::npos) return core::config_error(root.origin, violation.key, violation.rule);
+    key = key.substr(0, dot);
+  }
+}
+
 // Of the root of an experiment; unknown keys of it and below are errors.
 Experiment read_experiment(const ConfigTree& root) {
   Experiment experiment;
@@ -120,12 +132,7 @@ Experiment read_experiment(const ConfigTree& root) {
   } else if (experiment.metrics.first_n != 0 && experiment.metrics.first_s != 0.0) {
     violation = core::RuleViolation{"eval.first_s", "give eval.first_n or this, not both"};
   }
-  if (violation) {
-    const std::string& key = violation->key;
-    const ConfigTree* value = core::find_value(root, key);
-    if (value != nullptr) throw core::config_error(value->origin, key, violation->rule);
-    throw core::config_error(root.origin, key, violation->rule);
-  }
+  if (violation) throw located(root, *violation);
   return experiment;
 }
 
@@ -150,23 +157,6 @@ ordered_json axis_value(const ConfigTree& tree) {
   return parsed.is_discarded() ? ordered_json(tree.scalar) : parsed;
 }
 
-void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_t depth, const ordered_json& values,
-               std::vector<Cell>& cells) {
-  if (depth == axes.size()) {
-    Cell cell{.axes = values, .experiment = read_experiment(root), .config_hash = {}};
-    cell.config_hash = hash_of(cell.experiment);
-    cells.push_back(std::move(cell));
-    return;
-  }
-  for (const ConfigTree& value : axes[depth].values) {
-    ConfigTree with_value = root;
-    core::set_value(with_value, axes[depth].key, value);
-    ordered_json with_axis = values;
-    with_axis[axes[depth].key] = axis_value(value);
-    add_cells(with_value, axes, depth + 1, with_axis, cells);
-  }
-}
-
 // What only shows when a scenario's parts meet: pose files that are too short, worlds without room for the path, motion
 // that no IMU could follow.
 void check_scenario(const sim::ScenarioConfig& scenario, core::TrialId id) {
@@ -182,20 +172,48 @@ void check_cell(const Experiment& e) {
       e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
   if (e.metrics.crlb) {
     if (e.metrics.first_n > 0 || e.metrics.first_s > 0.0) {
-      throw core::ConfigError("eval.crlb: is of an alignment by all poses; leave out first_n and first_s");
+      throw core::RuleError({"eval.crlb", "is of an alignment by all poses; leave out first_n and first_s"});
     }
     // The bound speaks of the true noise, whatever the estimator believes.
     const core::ImuNoise& imu = e.scenario.imu.noise;
     const double least = std::min({imu.gyro_noise_density, imu.gyro_bias_walk, imu.accel_noise_density,
                                    imu.accel_bias_walk, e.scenario.camera.pixel_sigma_px});
     if (!(least >= core::kLeastSigma)) {
-      throw core::ConfigError(
-          fmt::format("eval.crlb: needs noise: scenario.camera.pixel_sigma_px and the four noises of scenario.imu must "
-                      "be >= {}",
-                      core::kLeastSigma));
+      throw core::RuleError(
+          {"eval.crlb", fmt::format("needs noise: scenario.camera.pixel_sigma_px and the four noises of scenario.imu "
+                                    "must be >= {}",
+                                    core::kLeastSigma)});
     }
   }
   check_scenario(e.scenario, {e.experiment.seed, 0});
+}
+
+// Such a check, whose findings are located.
+template <class Check>
+void check_meeting(const ConfigTree& root, Check check) {
+  try {
+    check();
+  } catch (const core::RuleError& error) {
+    throw located(root, error.violation);
+  }
+}
+
+void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_t depth, const ordered_json& values,
+               std::vector<Cell>& cells) {
+  if (depth == axes.size()) {
+    Cell cell{.axes = values, .experiment = read_experiment(root), .config_hash = {}};
+    cell.config_hash = hash_of(cell.experiment);
+    check_meeting(root, [&] { check_cell(cell.experiment); });
+    cells.push_back(std::move(cell));
+    return;
+  }
+  for (const ConfigTree& value : axes[depth].values) {
+    ConfigTree with_value = root;
+    core::set_value(with_value, axes[depth].key, value);
+    ordered_json with_axis = values;
+    with_axis[axes[depth].key] = axis_value(value);
+    add_cells(with_value, axes, depth + 1, with_axis, cells);
+  }
 }
 
 Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std::string& default_name) {
@@ -204,9 +222,7 @@ Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std:
   std::string& name = plan.base.experiment.name;
   if (name.empty()) name = default_name;
   if (name.find('/') != std::string::npos || name == "." || name == "..") {
-    const ConfigTree* value = core::find_value(root, "experiment.name");
-    throw core::config_error(value != nullptr ? value->origin : root.origin, "experiment.name",
-                             fmt::format("must be a plain name, got '{}'", name));
+    throw located(root, {"experiment.name", fmt::format("must be a plain name, got '{}'", name)});
   }
   add_cells(root, axes, 0, ordered_json::object(), plan.cells);
   std::string hashes;
@@ -268,14 +284,13 @@ Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>
   require_map(root, "");
   std::vector<Axis> axes;
   root = apply_overrides(std::move(root), overrides, &axes);
-  Plan plan = make_plan(root, axes, file.stem().string());
-  for (const Cell& cell : plan.cells) check_cell(cell.experiment);
-  return plan;
+  return make_plan(root, axes, file.stem().string());
 }
 
 sim::ScenarioConfig load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
-  const Experiment experiment = read_experiment(apply_overrides(wrap(file, "scenario"), overrides, nullptr));
-  check_scenario(experiment.scenario, {});
+  const ConfigTree root = apply_overrides(wrap(file, "scenario"), overrides, nullptr);
+  const Experiment experiment = read_experiment(root);
+  check_meeting(root, [&] { check_scenario(experiment.scenario, {}); });
   return experiment.scenario;
 }
 

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace plumbline::core {
 
@@ -28,6 +29,14 @@ class DataError : public InputError {
 struct RuleViolation {
   std::string key;
   std::string rule;
+};
+
+// The same where it only shows later, when a scenario's parts meet; what() is "key: rule".
+class RuleError : public ConfigError {
+ public:
+  explicit RuleError(RuleViolation v) : ConfigError(v.key + ": " + v.rule), violation(std::move(v)) {}
+
+  RuleViolation violation;  // the full key
 };
 
 }  // namespace plumbline::core

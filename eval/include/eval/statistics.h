@@ -6,6 +6,9 @@
 
 namespace plumbline::eval {
 
+// Of every interval and band that is reported.
+inline constexpr double kConfidence = 0.95;
+
 struct Interval {
   double lo = 0.0;
   double hi = 0.0;

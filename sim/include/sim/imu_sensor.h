@@ -23,7 +23,7 @@ struct ImuRecording {
   std::vector<core::ImuBias> biases;    // the truth at each of these
 };
 
-// Samples at 0, dt, 2 dt, ... up to duration_s. Throws core::DataError where keys that are sound one by one add up to
+// Samples at 0, dt, 2 dt, ... up to duration_s. Throws core::RuleError where keys that are sound one by one add up to
 // a motion or to errors that no sensor could follow.
 ImuRecording simulate_imu(const Trajectory& trajectory, const ImuConfig& config, double gravity_m_s2, double duration_s,
                           core::TrialId id);

@@ -17,7 +17,8 @@ struct Simulation {
 // end, so that an estimate of td may be wrong by as much and still find IMU samples.
 inline constexpr double kCameraLeadS = 0.25;
 
-// Deterministic in (config, id). Throws core::DataError where the pose file of a spline cannot be used.
+// Deterministic in (config, id). Throws core::DataError where the pose file of a spline cannot
+// be used, core::RuleError where keys that are sound one by one do not go together.
 Simulation simulate(const ScenarioConfig& config, core::TrialId id);
 
 }  // namespace plumbline::sim

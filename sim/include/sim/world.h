@@ -23,7 +23,7 @@ struct World {
   }
 };
 
-// Sized by the path; neither body nor camera passes through a wall. Throws core::DataError where that cannot be.
+// Sized by the path; neither body nor camera passes through a wall. Throws core::RuleError where that cannot be.
 World make_world(const ScenarioConfig& scenario, const Trajectory& trajectory, core::TrialId id);
 
 // The positions of the body, then those of the camera, at 100 Hz; the spacing of neighbours is what a wall's clearance
