@@ -42,8 +42,9 @@ inline Block scalar_block(double x, double ridders_step = 1e-3) { return {{x}, n
 // Moves a block along its manifold, by standard normal numbers times the scale.
 inline void displace(Block& b, double scale, const core::RandomStream& random, std::uint64_t index, std::uint64_t sub) {
   Eigen::VectorXd delta(b.tangent_size());
-  for (int i = 0; i < delta.size(); ++i)
+  for (int i = 0; i < delta.size(); ++i) {
     delta[i] = scale * random.normal(index, 100 * sub + static_cast<std::uint64_t>(i));
+  }
   b.values = b.plus(delta);
 }
 
@@ -70,9 +71,9 @@ inline Evaluation evaluate(const ceres::CostFunction& factor, const std::vector<
                            const std::vector<bool>& wanted) {
   Evaluation e{Eigen::VectorXd(factor.num_residuals()), {}};
   std::vector<double*> jacobians;
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
+  for (const Block& block : blocks) {
     // What a factor forgets to write stays NaN.
-    e.jacobians.emplace_back(RowMajorMatrix::Constant(factor.num_residuals(), static_cast<int>(blocks[k].values.size()),
+    e.jacobians.emplace_back(RowMajorMatrix::Constant(factor.num_residuals(), static_cast<int>(block.values.size()),
                                                       std::numeric_limits<double>::quiet_NaN()));
   }
   for (std::size_t k = 0; k < blocks.size(); ++k) jacobians.push_back(wanted[k] ? e.jacobians[k].data() : nullptr);

@@ -139,7 +139,7 @@ void write_yaml(const std::filesystem::path& file, const Config& config) {
 // A dataset states everything: a key that is missing is a file cut short, not a default.
 void require_keys(const ConfigTree& tree, const nlohmann::ordered_json& resolved, const std::string& prefix) {
   for (const auto& [key, value] : resolved.items()) {
-    const std::string dotted = prefix.empty() ? key : prefix + "." + key;
+    const std::string dotted = prefix.empty() ? key : fmt::format("{}.{}", prefix, key);
     if (find_value(tree, dotted) == nullptr) throw config_error(tree.origin, dotted, "is missing");
     if (value.is_object()) require_keys(tree, value, dotted);
   }

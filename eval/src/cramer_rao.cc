@@ -240,6 +240,7 @@ class Builder {
 
   void add_causal(std::size_t k) {
     std::vector<Variable> weak;
+    weak.reserve(alive_.size());
     for (const int t : alive_) weak.push_back(tracks_[static_cast<std::size_t>(t)].variable);
     const Layout l = layout();
     const Eigen::MatrixXd scaled = chain_.causal_covariance(calibration_and(states_[k + 1]), weak);

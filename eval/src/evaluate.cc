@@ -174,6 +174,7 @@ std::optional<Metric> td_convergence(const core::EstimateLog& estimate, double t
 // On the grid of a series.
 std::vector<NeesPoint> online_nees(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
   std::vector<core::TimeNs> stamps;
+  stamps.reserve(estimate.state_history.size());
   for (const core::OnlineState& s : estimate.state_history) stamps.push_back(s.t_ns);
   std::vector<NeesPoint> points;
   for (const int k : grid_indices(stamps)) {

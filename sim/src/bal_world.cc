@@ -56,8 +56,7 @@ std::vector<Eigen::Vector3d> make_points(const BalWorldConfig& config, core::Tri
 
 std::optional<Eigen::Vector2d> sees(const BalCamera& camera, const Eigen::Vector3d& X, double half_picture_px) {
   if (!core::in_front(camera, core::ViewAxis::kMinusZ, X)) return std::nullopt;
-  const auto pixel =
-      core::project_bal(camera.intrinsics, core::ViewAxis::kMinusZ, core::exp_so3(camera.w) * X + camera.t);
+  auto pixel = core::project_bal(camera.intrinsics, core::ViewAxis::kMinusZ, core::exp_so3(camera.w) * X + camera.t);
   if (!pixel || pixel->cwiseAbs().maxCoeff() > half_picture_px) return std::nullopt;
   return pixel;
 }

@@ -11,8 +11,9 @@ struct Draw {
 Draw draw(const GroundTruth& truth, const core::StateSigmas& sigma, const core::CalibrationSigmas& calibration_sigma,
           const core::RandomStream& stream) {
   core::StateTangent noise;
-  for (int block = 0; block < 5; ++block)
+  for (Eigen::Index block = 0; block < 5; ++block) {
     noise.segment<3>(3 * block) = stream.normal3(static_cast<std::uint64_t>(block));
+  }
   const Eigen::Vector3d extrinsic_position = stream.normal3(5);
   const Eigen::Vector3d extrinsic_rotation = stream.normal3(6);
   core::RigCalibration calibration = truth.calibration;

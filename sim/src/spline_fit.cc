@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
@@ -211,7 +210,7 @@ SplineFit fit_spline(const std::vector<core::StampedPose>& poses, const Trajecto
   const FitResiduals residuals = fitter.residuals(controls);
   // The margin before the span is cut off, so that time 0 is start_s.
   controls.erase(controls.begin(), controls.begin() + before);
-  return {SplineTrajectory(std::move(controls), knot_s / config.speed_up), residuals, span};
+  return {SplineTrajectory(controls, knot_s / config.speed_up), residuals, span};
 }
 
 }  // namespace plumbline::sim

@@ -13,7 +13,7 @@ using bspline::cumulative_blending;
 using bspline::kOrder;
 using bspline::powers;
 
-SplineTrajectory::SplineTrajectory(std::vector<core::Pose> controls, double knot_interval_s)
+SplineTrajectory::SplineTrajectory(const std::vector<core::Pose>& controls, double knot_interval_s)
     : knot_interval_s_(knot_interval_s) {
   for (const core::Pose& pose : controls) {
     positions_.push_back(pose.p);

@@ -34,6 +34,7 @@ BundleErrors compare(const core::BalProblem& estimate, const core::BalProblem& t
   }
   const auto places = [](const core::BalProblem& bal) {
     std::vector<Eigen::Vector3d> x;
+    x.reserve(bal.cameras.size() + bal.points.size());
     for (const core::BalCamera& camera : bal.cameras) x.push_back(camera.centre());
     x.insert(x.end(), bal.points.begin(), bal.points.end());
     return x;
@@ -96,7 +97,7 @@ int ba(const BaOptions& options) {
   if (options.truth) truth = core::read_bal(*options.truth);
   const estimator::BundleResult result = estimator::adjust_bundle(std::move(problem), options.adjustment);
   std::optional<BundleErrors> errors;
-  if (truth) errors = compare(result.problem, *truth, options.truth->generic_string());
+  if (options.truth && truth) errors = compare(result.problem, *truth, options.truth->generic_string());
   if (options.out) core::write_bal(*options.out, result.problem);
   if (options.json) {
     ordered_json json = to_json(result);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
@@ -39,6 +40,16 @@ double tick_step(double span) {
   return 10.0 * power;
 }
 
+// The multiples of step within [lo, hi].
+std::vector<double> multiples(double step, double lo, double hi) {
+  std::vector<double> result;
+  const auto last = static_cast<long>(std::floor(hi / step));
+  for (auto n = static_cast<long>(std::ceil(lo / step)); n <= last; ++n) {
+    result.push_back(static_cast<double>(n) * step);
+  }
+  return result;
+}
+
 }  // namespace
 
 Colour along_the_scale(double share) {
@@ -70,12 +81,12 @@ void Canvas::draw_axes(const std::string& x_label, const std::string& y_label) {
     cv::putText(image_, text, corner, kFont, kTextScale, kInk, 1, cv::LINE_AA);
   };
   const auto tick = [&](double value) { return fmt::format("{:g}", std::abs(value) < 1e-9 * step ? 0.0 : value); };
-  for (double x = std::ceil(view_.min().x() / step) * step; x <= view_.max().x(); x += step) {
+  for (const double x : multiples(step, view_.min().x(), view_.max().x())) {
     const int at = whole_pixel({x, view_.min().y()}).x;
     cv::line(plot_, {at, 0}, {at, plot_.rows}, kGrid, 1);
     write(tick(x), {kLeftPx + at - text_size(tick(x)).width / 2, right_bottom.y + 22});
   }
-  for (double y = std::ceil(view_.min().y() / step) * step; y <= view_.max().y(); y += step) {
+  for (const double y : multiples(step, view_.min().y(), view_.max().y())) {
     const int at = whole_pixel({view_.min().x(), y}).y;
     cv::line(plot_, {0, at}, {plot_.cols, at}, kGrid, 1);
     write(tick(y), {kLeftPx - 10 - text_size(tick(y)).width, kTopPx + at + 6});

@@ -233,6 +233,7 @@ Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std:
 
 ConfigTree apply_overrides(ConfigTree root, const std::vector<std::string>& overrides, std::vector<Axis>* axes) {
   std::vector<core::ConfigOverride> parsed;
+  parsed.reserve(overrides.size());
   for (const std::string& text : overrides) parsed.push_back(core::parse_override(text));
   // Files first, so that keys can be set on top of them wherever the file's name was given.
   for (core::ConfigOverride& o : parsed) {

@@ -15,7 +15,7 @@ namespace plumbline::sim {
 class SplineTrajectory final : public Trajectory {
  public:
   // Control poses, one each knot_interval_s; the first segment [0, knot_interval_s] belongs to controls 0..5.
-  SplineTrajectory(std::vector<core::Pose> controls, double knot_interval_s);
+  SplineTrajectory(const std::vector<core::Pose>& controls, double knot_interval_s);
 
   Kinematics at(double t_s) const override;
   core::Pose pose_at(double t_s) const override;
