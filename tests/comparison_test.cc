@@ -27,7 +27,7 @@ std::vector<CellOutcomes> variant(double factor, const std::string& name, int tr
     CellOutcomes& cell = cells.emplace_back();
     cell.axes = {{"scenario.camera.td_s", 0.01 * c}};
     for (int t = 0; t < trials; ++t) {
-      const auto index = static_cast<std::uint64_t>(100 * c + t);
+      const auto index = 100 * static_cast<std::uint64_t>(c) + static_cast<std::uint64_t>(t);
       Row row;
       row.cell = c;
       row.trial = t;
