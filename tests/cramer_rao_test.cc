@@ -84,11 +84,12 @@ estimator::BatchValues true_values(const estimator::BatchInput& input, const sim
 class Bound : public ::testing::Test {
  protected:
   core::PosteriorCovariance brute_force(const estimator::EstimatorConfig& config) const {
-    estimator::BatchInput input{.log = log(),
-                                .config = config,
-                                .noise = estimator::believed_noise(config, log().imu_noise, log().pixel_sigma_px),
-                                .keyframes = every_second_frame(log()),
-                                .tracks = {}};
+    estimator::BatchInput input{
+        .log = log(),
+        .config = config,
+        .noise = estimator::believed_noise(config, log().imu_noise, log().pixel_sigma_px, log().line_sigma_px),
+        .keyframes = every_second_frame(log()),
+        .tracks = {}};
     input.tracks = estimator::collect_tracks(log().frames, input.keyframes, log().camera);
     return *estimator::BatchProblem(input, true_values(input, simulation_.truth)).posterior_covariance();
   }
@@ -322,7 +323,8 @@ TEST(AlignedBound, EqualsMonteCarloOfTheLinearModel) {
     rows.push_back({chain.offset(variables.back()), chain.offset(variables.back()) + 3, 1e-4, 1e-4});
     Eigen::MatrixXd J(6, k == 0 ? 6 : 12);
     for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c < J.cols(); ++c) J(r, c) = random.normal(100 + index, static_cast<std::uint64_t>(12 * r + c));
+      const auto row = 12 * static_cast<std::uint64_t>(r);
+      for (int c = 0; c < J.cols(); ++c) J(r, c) = random.normal(100 + index, row + static_cast<std::uint64_t>(c));
     }
     J.rightCols<6>() += 3.0 * Eigen::MatrixXd::Identity(6, 6);
     observe(k == 0 ? std::vector<int>{0} : std::vector<int>{k - 1, k}, J);

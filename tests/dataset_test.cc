@@ -60,8 +60,12 @@ bool same(const std::vector<core::Frame>& a, const std::vector<core::Frame>& b) 
   const auto same_point = [](const core::PointObservation& x, const core::PointObservation& y) {
     return x.track_id == y.track_id && x.pixel == y.pixel && x.velocity == y.velocity;
   };
+  const auto same_line = [](const core::LineObservation& x, const core::LineObservation& y) {
+    return x.track_id == y.track_id && x.ends_px == y.ends_px && x.velocities == y.velocities;
+  };
   return std::ranges::equal(a, b, [&](const core::Frame& x, const core::Frame& y) {
-    return x.t_cam_ns == y.t_cam_ns && std::ranges::equal(x.points, y.points, same_point);
+    return x.t_cam_ns == y.t_cam_ns && std::ranges::equal(x.points, y.points, same_point) &&
+           std::ranges::equal(x.lines, y.lines, same_line);
   });
 }
 
@@ -91,6 +95,7 @@ void expect_same(const core::MeasurementLog& a, const core::MeasurementLog& b) {
   EXPECT_EQ(a.imu_noise.accel_noise_density, b.imu_noise.accel_noise_density);
   EXPECT_EQ(a.imu_noise.accel_bias_walk, b.imu_noise.accel_bias_walk);
   EXPECT_EQ(a.pixel_sigma_px, b.pixel_sigma_px);
+  EXPECT_EQ(a.line_sigma_px, b.line_sigma_px);
   EXPECT_EQ(a.gravity_m_s2, b.gravity_m_s2);
 }
 
@@ -101,6 +106,12 @@ void expect_same(const GroundTruth& a, const GroundTruth& b) {
   }));
   EXPECT_EQ(a.landmarks_W, b.landmarks_W);
   EXPECT_EQ(a.track_landmark, b.track_landmark);
+  EXPECT_TRUE(std::ranges::equal(a.segments_W, b.segments_W, {}, &Segment::ends_W, &Segment::ends_W));
+  EXPECT_EQ(a.track_segment, b.track_segment);
+  EXPECT_TRUE(std::ranges::equal(a.line_ends, b.line_ends, [](const LineEnds& x, const LineEnds& y) {
+    return x.frame_ns == y.frame_ns && x.track_id == y.track_id && x.segment == y.segment && x.t_imu_s == y.t_imu_s &&
+           x.ends_px == y.ends_px;
+  }));
 }
 
 TEST(Simulate, SameTrialSameNumbers) {
@@ -194,7 +205,8 @@ TEST(Simulate, TruthAtAnInstant) {
 
 class Dataset : public testing::Test {
  protected:
-  Dataset() : simulation_(simulate(some_config(), {.seed = 3, .trial = 0})) {
+  explicit Dataset(const ScenarioConfig& config = some_config())
+      : simulation_(simulate(config, {.seed = 3, .trial = 0})) {
     fs::remove_all(folder_);
     core::write_dataset(folder_, simulation_.measurements, {.config_hash = "0123456789abcdef", .seed = 3, .trial = 0});
     write_truth(folder_, simulation_.truth);
@@ -362,6 +374,90 @@ TEST_F(Dataset, RefusesBrokenTruth) {
   rewrite(states, original + original.substr(second, original.find('\n', second) + 1 - second));
   EXPECT_THROW(read_truth(folder_), core::DataError);
   rewrite(states, original.substr(0, second + 40) + "\n");
+  EXPECT_THROW(read_truth(folder_), core::DataError);
+}
+
+ScenarioConfig config_with_lines() {
+  ScenarioConfig config = some_config();
+  config.world.lines.random = 400;
+  config.lines = {.per_frame = 10, .sigma_px = 0.7, .slide_sigma_px = 2.0, .fragment_probability = 0.02};
+  return config;
+}
+
+class LineDataset : public Dataset {
+ protected:
+  LineDataset() : Dataset(config_with_lines()) {}
+
+  const std::string frame_ = std::to_string(simulation_.measurements.frames.front().t_cam_ns);
+};
+
+constexpr const char* kLines = "mav0/cam0/lines.csv";
+
+TEST_F(LineDataset, ReadsBackToTheBit) {
+  std::size_t lines = 0;
+  std::size_t with_velocities = 0;
+  for (const core::Frame& frame : simulation_.measurements.frames) {
+    lines += frame.lines.size();
+    for (const auto& line : frame.lines) with_velocities += line.velocities ? 1 : 0;
+  }
+  ASSERT_GT(lines, 100U);
+  ASSERT_GT(with_velocities, 50U);
+  ASSERT_LT(with_velocities, lines);  // of both kinds
+  expect_same(core::read_dataset(folder_), simulation_.measurements);
+  expect_same(read_truth(folder_), simulation_.truth);
+}
+
+TEST_F(LineDataset, IsReadableWithoutLines) {
+  fs::remove(folder_ / kLines);
+  EXPECT_THAT(refusal(), HasSubstr("lines.csv: cannot be read"));  // the sensor speaks of lines
+  std::string sensor = text("mav0/cam0/sensor.yaml");
+  const std::size_t key = sensor.find("line_sigma_px");
+  ASSERT_NE(key, std::string::npos);
+  rewrite("mav0/cam0/sensor.yaml", sensor.erase(key, sensor.find('\n', key) + 1 - key));
+  core::MeasurementLog without = simulation_.measurements;
+  without.line_sigma_px = 0.0;
+  for (core::Frame& frame : without.frames) frame.lines.clear();
+  expect_same(core::read_dataset(folder_), without);
+}
+
+TEST_F(LineDataset, RefusesLinesWithoutTheirNoise) {
+  std::string sensor = text("mav0/cam0/sensor.yaml");
+  const std::size_t key = sensor.find("line_sigma_px");
+  rewrite("mav0/cam0/sensor.yaml", sensor.erase(key, sensor.find('\n', key) + 1 - key));
+  EXPECT_THAT(refusal(), testing::AllOf(HasSubstr("sensor.yaml"), HasSubstr("line_sigma_px"), HasSubstr("is missing")));
+}
+
+TEST_F(LineDataset, HoldsTheRowsTimesInTheTruthOnly) {
+  EXPECT_EQ(text(kLines).find("t_imu"), std::string::npos);
+  for (const char* file : {"truth/segments.csv", "truth/line_tracks.csv", "truth/line_ends.csv"}) {
+    EXPECT_TRUE(fs::exists(folder_ / file)) << file;
+  }
+  fs::remove_all(folder_ / "truth");
+  expect_same(core::read_dataset(folder_), simulation_.measurements);
+}
+
+TEST_F(LineDataset, NamesTheLineOfABrokenRow) {
+  const auto says = [&](const std::string& row) { return refusal_of(kLines, 2, frame_ + row); };
+  EXPECT_EQ(says(",900,1,2,3,4"), "accepted");
+  EXPECT_EQ(says(",900,1,2,3,4,,,,"), "accepted");
+  EXPECT_EQ(says(",900,1,2,3,4,0.1,0.2,0.3,0.4"), "accepted");
+  for (const char* row : {",900,1,2,3", ",900,1,2,3,nan", ",900,1,2,3,4,0.1,0.2", ",900,1,2,3,4,0.1,,,",
+                          ",900,1,2,3,4,,,,0.4", ",900,1,2,3,4,,0.2,,", ",0.5,1,2,3,4", ",900,1,2,3,4,1,2,3,inf"}) {
+    EXPECT_THAT(says(row), HasSubstr("mav0/cam0/lines.csv:2: ")) << row;
+  }
+  EXPECT_THAT(refusal_of(kLines, 2, "17,900,1,2,3,4"), HasSubstr("lines.csv:2: frame 17 "));
+  const std::string second = std::to_string(simulation_.measurements.frames.front().lines.at(1).track_id);
+  EXPECT_THAT(says("," + second + ",1,2,3,4"), HasSubstr("lines.csv:3: track " + second));
+}
+
+TEST_F(LineDataset, RefusesTruthOfUnknownSegments) {
+  const std::string original = text("truth/line_tracks.csv");
+  for (const char* row : {"0,400\n", "0,-1\n"}) {
+    rewrite("truth/line_tracks.csv", row);
+    EXPECT_THROW(read_truth(folder_), core::DataError) << row;
+  }
+  rewrite("truth/line_tracks.csv", original);
+  rewrite("truth/line_ends.csv", "0,0,400,0,0,1,1,1,1\n");
   EXPECT_THROW(read_truth(folder_), core::DataError);
 }
 

@@ -16,10 +16,9 @@ const core::RandomStream kRandom({21, 0}, "information_chain_test");
 
 Eigen::MatrixXd random_matrix(int rows, int cols, std::uint64_t seed) {
   Eigen::MatrixXd m(rows, cols);
+  std::uint64_t index = 0;
   for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < cols; ++c) {
-      m(r, c) = kRandom.normal(seed, static_cast<std::uint64_t>(r * cols + c));
-    }
+    for (int c = 0; c < cols; ++c) m(r, c) = kRandom.normal(seed, index++);
   }
   return m;
 }

@@ -39,7 +39,8 @@ struct Case {
   fs::path file;          // that is written first, replacing a sound one
   std::string text;
   std::vector<std::string> says;  // parts of the message
-  std::string replaces = {};      // what of a sound file `text` is written for; all of it where empty
+  // What of a sound file `text` is written for; all of it where empty.
+  std::string replaces = {};  // NOLINT(readability-redundant-member-init): g++ warns of designated lists without it
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -51,10 +52,12 @@ class Malformed : public ProgramTest, public ::testing::WithParamInterface<Case>
     sound_ = new fs::path(make_folder());
     save(*sound_ / "scenario.yaml",
          "duration_s: 1\nimu: {rate_hz: 50, gyro_noise_density_rad_s_sqrt_hz: 1e-3, gyro_bias_walk_rad_s2_sqrt_hz: "
-         "1e-4, accel_noise_density_m_s2_sqrt_hz: 1e-2, accel_bias_walk_m_s3_sqrt_hz: 1e-3}\npoints: {per_frame: 5}\n");
+         "1e-4, accel_noise_density_m_s2_sqrt_hz: 1e-2, accel_bias_walk_m_s3_sqrt_hz: 1e-3}\npoints: {per_frame: 5}\n"
+         "world: {lines: {random: 300}}\nlines: {per_frame: 3}\n");
     std::string poses;
-    for (int i = 0; i <= 100; ++i)
+    for (int i = 0; i <= 100; ++i) {
       poses += std::to_string(0.05 * i) + " " + std::to_string(0.01 * i) + " 0 0 0 0 0 1\n";
+    }
     save(*sound_ / "poses.tum", poses);
     save(*sound_ / "spline.yaml", "duration_s: 2\ntrajectory: {type: spline, file: poses.tum}\n");
     ASSERT_EQ(plumbline_in(*sound_, "simulate scenario.yaml --out data").code, 0);
@@ -115,7 +118,8 @@ Case poses(std::string name, std::string text, std::vector<std::string> says) {
 }
 
 // A dataset in which the first occurrence of `from` in one of its files becomes `to`.
-Case edited(std::string name, std::string file, std::string from, std::string to, std::vector<std::string> says) {
+Case edited(std::string name, const std::string& file, std::string from, std::string to,
+            std::vector<std::string> says) {
   says.insert(says.begin(), file);
   return {.name = std::move(name),
           .arguments = "estimate data --out out",
@@ -126,7 +130,7 @@ Case edited(std::string name, std::string file, std::string from, std::string to
 }
 
 // A dataset of which one file is replaced.
-Case dataset(std::string name, std::string file, std::string text, std::vector<std::string> says) {
+Case dataset(std::string name, const std::string& file, std::string text, std::vector<std::string> says) {
   says.insert(says.begin(), file);
   return {std::move(name), "estimate data --out out", fs::path("data") / file, std::move(text), std::move(says)};
 }
@@ -174,6 +178,10 @@ std::vector<Case> keys_and_values() {
       scenario("FrequenciesReversed", "trajectory:\n  handheld: {lowest_frequency_hz: 2, highest_frequency_hz: 1}\n",
                {":2:", "trajectory.handheld.highest_frequency_hz"}),
       scenario("DistancesReversed", "world: {nearest_m: 5, farthest_m: 2}\n", {":1:", "world.farthest_m"}),
+      scenario("LineDistancesReversed", "lines: {nearest_m: 5, farthest_m: 2}\n", {":1:", "lines.farthest_m"}),
+      scenario("LineLengthsReversed", "world:\n  lines: {random_shortest_m: 5, random_longest_m: 2}\n",
+               {":2:", "world.lines.random_longest_m"}),
+      scenario("LinesInAWorldWithout", "lines: {per_frame: 20}\n", {":1:", "lines.per_frame", "world.lines"}),
       scenario("SplineWithoutFile", "trajectory: {type: spline}\n", {"trajectory.file"}),
       scenario("SplineFileMissing", "trajectory: {type: spline, file: nowhere.tum}\n",
                {":1:", "trajectory.file", "nowhere.tum"}),
@@ -193,6 +201,8 @@ std::vector<Case> beyond_physics() {
       scenario("Margin", "world: {type: rooms, rooms: {margin_m: 1e4}}\n", {":1:", "rooms.longest_side_m", "larger"}),
       scenario("Clearance", "world: {type: rooms, walls: {clearance_m: 1e9}}\n", {":1:", "walls.clearance_m"}),
       scenario("Radius", "trajectory: {type: circle, loop: {radius_m: 1e300}}\n", {":1:", "loop.radius_m"}),
+      scenario("TooManySegments", "world: {type: rooms, lines: {grid_spacing_m: 1e-9}}\nlines: {per_frame: 20}\n",
+               {":1:", "scenario.world.lines", "fewer"}),
       scenario("TooFast", "trajectory: {type: circle, loop: {radius_m: 1e4, period_s: 0.01}}\n",
                {":1:", "scenario.trajectory", "slower"}),
       scenario("PathToNowhere",
@@ -375,6 +385,13 @@ std::vector<Case> data_files() {
               {":1:", "gyroscope_noise_density"}),
       dataset("TrackTwiceInAFrame", "mav0/cam0/points.csv", "300000000,7,10,10\n300000000,7,11,10\n",
               {":2:", "track 7"}),
+      dataset("LineOfNoFrame", "mav0/cam0/lines.csv", "1,0,10,10,50,50\n", {":1:", "frame 1"}),
+      dataset("LineRowCutShort", "mav0/cam0/lines.csv", "300000000,0,10,10,50\n", {":1:", "columns"}),
+      dataset("LineNan", "mav0/cam0/lines.csv", "300000000,0,10,10,nan,50\n", {":1:", "nan"}),
+      dataset("LineWithHalfItsVelocities", "mav0/cam0/lines.csv", "300000000,0,10,10,50,50,1,1,,\n", {":1:"}),
+      dataset("LineTrackTwiceInAFrame", "mav0/cam0/lines.csv", "300000000,7,10,10,50,50\n300000000,7,11,10,50,50\n",
+              {":2:", "track 7"}),
+      edited("NegativeLineNoise", "mav0/cam0/sensor.yaml", "line_sigma_px: 1", "line_sigma_px: -1", {"line_sigma_px"}),
       edited("PriorAfterTheFirstFrame", "prior.yaml", "t_ns: 0", "t_ns: 500000000", {":1:", "t_ns", "first frame"}),
       edited("ImuBeyondPhysics", "mav0/imu0/data.csv", "\n20000000,", "\n20000000,1e200,0,0,0,0,9.81\n20000001,",
              {":3:", "rad/s"}),

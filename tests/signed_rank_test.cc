@@ -114,8 +114,10 @@ TEST(SignedRank, PowerIsAsStated) {
     int found = 0;
     for (std::uint64_t repetition = 0; repetition < 2000; ++repetition) {
       std::vector<double> d;
-      for (int i = 0; i < n; ++i)
-        d.push_back(shift + stream.normal(static_cast<std::uint64_t>(100 * n + i), repetition));
+      const auto first = 100 * static_cast<std::uint64_t>(n);
+      for (int i = 0; i < n; ++i) {
+        d.push_back(shift + stream.normal(first + static_cast<std::uint64_t>(i), repetition));
+      }
       found += signed_rank_p_value(d) <= 0.05 ? 1 : 0;
     }
     EXPECT_NEAR(found / 2000.0, 0.8, 0.03) << n;

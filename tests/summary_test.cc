@@ -93,8 +93,9 @@ TEST(Summary, ConvergenceCountsThoseThatNeverDid) {
 
 TEST(Summary, ResidualsOfAllTrialsTogether) {
   std::vector<Row> rows = kRows;
-  for (Row& r : rows)
+  for (Row& r : rows) {
     r.solver = {.iterations = 1, .final_cost = 45.0, .cost_per_dof = 0.9, .observations = 1, .landmarks = 1};
+  }
   const NisSummary nis = summarise(rows, {}).nis.value_or(NisSummary{});
   EXPECT_EQ(nis.dof, 400.0);
   EXPECT_NEAR(nis.mean, 0.9, 1e-12);

@@ -46,8 +46,10 @@ TEST(Walls, TurnedRoundIsTheSameSetOfPoints) {
   const Wall wall = wall_with_door();
   const Wall other = turned_round(wall);
   EXPECT_EQ(other.normal_W(), -wall.normal_W());
-  for (double a = -0.5; a < 5.0; a += 0.25) {
-    for (double b = -0.45; b < 4.0; b += 0.25) {
+  for (int i = 0; i < 22; ++i) {
+    for (int j = 0; j < 18; ++j) {
+      const double a = -0.5 + 0.25 * i;
+      const double b = -0.45 + 0.25 * j;
       const Eigen::Vector3d d = wall.at({a, b}) - other.corner_W;
       EXPECT_EQ(other.solid({d.dot(other.u_W), d.dot(other.v_W)}), wall.solid({a, b})) << a << ' ' << b;
     }
@@ -102,10 +104,12 @@ TEST_P(EveryWorld, WallsKeepTheirClearance) {
   const World world = make_world(scenario_, *trajectory_, kId);
   const std::vector<Eigen::Vector3d> path = sample_path(scenario_, *trajectory_).all();
   for (const Wall& wall : world.walls.walls) {
-    for (double a = 0.0; a <= wall.size_m.x(); a += 0.1) {
-      for (double b = 0.0; b <= wall.size_m.y(); b += 0.1) {
-        if (!wall.solid({a, b})) continue;
-        const Eigen::Vector3d place = wall.at({a, b});
+    const Eigen::Vector2i steps = (wall.size_m / 0.1).cast<int>();
+    for (int i = 0; i <= steps.x(); ++i) {
+      for (int j = 0; j <= steps.y(); ++j) {
+        const Eigen::Vector2d ab(0.1 * i, 0.1 * j);
+        if (!wall.solid(ab)) continue;
+        const Eigen::Vector3d place = wall.at(ab);
         const bool clear = std::all_of(path.begin(), path.end(), [&](const Eigen::Vector3d& p) {
           return (p - place).squaredNorm() > 0.399 * 0.399;
         });

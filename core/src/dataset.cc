@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -23,6 +24,7 @@ constexpr std::string_view kImuFile = "mav0/imu0/data.csv";
 constexpr std::string_view kImuSensor = "mav0/imu0/sensor.yaml";
 constexpr std::string_view kFramesFile = "mav0/cam0/data.csv";
 constexpr std::string_view kPointsFile = "mav0/cam0/points.csv";
+constexpr std::string_view kLinesFile = "mav0/cam0/lines.csv";
 constexpr std::string_view kCameraSensor = "mav0/cam0/sensor.yaml";
 
 // meta.yaml: the parts that say how to read the rest.
@@ -43,6 +45,7 @@ struct ImuSensorFile {
 struct CameraSensorFile {
   PinholeCamera model;
   double pixel_sigma_px = 0.0;
+  std::optional<double> line_sigma_px;  // where there is a file of lines
 };
 
 void visit(ConfigVisitor& v, MetaFile& c) {
@@ -66,6 +69,9 @@ void visit(ConfigVisitor& v, ImuSensorFile& c) {
 void visit(ConfigVisitor& v, CameraSensorFile& c) {
   visit(v, c.model);
   v.value("pixel_sigma_px", c.pixel_sigma_px, up_to(kMostPixels), "noise of u and v");
+  if (c.line_sigma_px) {
+    v.value("line_sigma_px", *c.line_sigma_px, up_to(kMostPixels), "noise of u and v of each end of a segment");
+  }
 }
 
 }  // namespace
@@ -146,8 +152,7 @@ void require_keys(const ConfigTree& tree, const nlohmann::ordered_json& resolved
 }
 
 template <class Config>
-Config read_all_keys(const ConfigTree& tree) {
-  Config config;
+Config read_all_keys(const ConfigTree& tree, Config config = {}) {
   read_config(tree, "", config);
   require_keys(tree, resolved_config(config), "");
   return config;
@@ -164,6 +169,76 @@ constexpr TimeNs kLargestStampNs = 4'000'000'000'000'000'000;  // 126 years
 void check_increasing(const CsvReader& csv, TimeNs previous, TimeNs now, bool first) {
   if (now < -kLargestStampNs || now > kLargestStampNs) csv.fail(fmt::format("stamp {} is beyond 126 years", now));
   if (!first && now <= previous) csv.fail(fmt::format("stamp {} does not come after {}", now, previous));
+}
+
+bool has_lines(const MeasurementLog& log) {
+  return log.line_sigma_px > 0.0 ||
+         std::any_of(log.frames.begin(), log.frames.end(), [](const Frame& frame) { return !frame.lines.empty(); });
+}
+
+std::string lines_text(const std::vector<Frame>& frames) {
+  std::string text = "#frame_ns,track_id,u0 [px],v0 [px],u1 [px],v1 [px],vx0 [s^-1],vy0 [s^-1],vx1 [s^-1],vy1 [s^-1]\n";
+  for (const Frame& frame : frames) {
+    for (const LineObservation& line : frame.lines) {
+      text += fmt::format("{},{}", frame.t_cam_ns, line.track_id);
+      for (const Eigen::Vector2d& end : line.ends_px) text += fmt::format(",{},{}", end.x(), end.y());
+      if (line.velocities) {
+        for (const Eigen::Vector2d& v : *line.velocities) text += fmt::format(",{},{}", v.x(), v.y());
+        text += '\n';
+      } else {
+        text += ",,,,\n";
+      }
+    }
+  }
+  return text;
+}
+
+// Walks through the frames beside a file of observations, which has them in the same order.
+class FrameWalk {
+ public:
+  FrameWalk(std::vector<Frame>& frames, const CsvReader& csv) : frames_(frames), csv_(csv), frame_(frames.begin()) {}
+
+  // The frame of the reader's present row, whose first columns are its stamp and a track that it has not named yet.
+  Frame& of_row() {
+    const TimeNs t_ns = csv_.integer(0);
+    for (; frame_ != frames_.end() && frame_->t_cam_ns < t_ns; ++frame_) tracks_.clear();
+    if (frame_ == frames_.end() || frame_->t_cam_ns != t_ns) {
+      csv_.fail(fmt::format("frame {} is not in {}, or out of order", t_ns, kFramesFile));
+    }
+    if (!tracks_.insert(csv_.integer(1)).second) {
+      csv_.fail(fmt::format("track {} is in frame {} already", csv_.integer(1), t_ns));
+    }
+    return *frame_;
+  }
+
+ private:
+  std::vector<Frame>& frames_;
+  const CsvReader& csv_;
+  std::vector<Frame>::iterator frame_;
+  std::set<std::int64_t> tracks_;  // of the frame
+};
+
+void read_points(const std::filesystem::path& file, std::vector<Frame>& frames) {
+  CsvReader csv(file, 4, 2);
+  FrameWalk walk(frames, csv);
+  while (csv.next()) {
+    PointObservation& point = walk.of_row().points.emplace_back();
+    point.track_id = csv.integer(1);
+    point.pixel = {csv.number(2), csv.number(3)};
+    if (csv.has(4) || csv.has(5)) point.velocity = {csv.number(4), csv.number(5)};
+  }
+}
+
+void read_lines(const std::filesystem::path& file, std::vector<Frame>& frames) {
+  CsvReader csv(file, 6, 4);
+  FrameWalk walk(frames, csv);
+  const auto pair = [&](std::size_t column) -> Eigen::Vector2d { return {csv.number(column), csv.number(column + 1)}; };
+  while (csv.next()) {
+    LineObservation& line = walk.of_row().lines.emplace_back();
+    line.track_id = csv.integer(1);
+    line.ends_px = {pair(2), pair(4)};
+    if (csv.has(6) || csv.has(7) || csv.has(8) || csv.has(9)) line.velocities = {pair(6), pair(8)};
+  }
 }
 
 // What joins the prior with itself, with the IMU and, by its td, with the frames.
@@ -225,7 +300,12 @@ void write_dataset(const std::filesystem::path& folder, const MeasurementLog& lo
   }
   write_file_atomically(folder / kFramesFile, frames);
   write_file_atomically(folder / kPointsFile, points);
-  write_yaml(folder / kCameraSensor, CameraSensorFile{log.camera, log.pixel_sigma_px});
+  CameraSensorFile sensor{.model = log.camera, .pixel_sigma_px = log.pixel_sigma_px, .line_sigma_px = std::nullopt};
+  if (has_lines(log)) {
+    sensor.line_sigma_px = log.line_sigma_px;
+    write_file_atomically(folder / kLinesFile, lines_text(log.frames));
+  }
+  write_yaml(folder / kCameraSensor, sensor);
   write_yaml(folder / "prior.yaml", log.prior);
   MetaFile file;
   file.gravity_m_s2 = log.gravity_m_s2;
@@ -244,12 +324,18 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
   if (meta.td_reference_row != RowReference::kMiddle) {
     throw DataError(fmt::format("{}: td_reference_row must be middle", (folder / "meta.yaml").generic_string()));
   }
-  const auto camera = read_yaml<CameraSensorFile>(folder / kCameraSensor);
+  const ConfigTree sensor = load_config_file(folder / kCameraSensor);
+  CameraSensorFile expected;
+  if (std::filesystem::exists(folder / kLinesFile) || find_value(sensor, "line_sigma_px") != nullptr) {
+    expected.line_sigma_px = 0.0;
+  }
+  const CameraSensorFile camera = read_all_keys(sensor, expected);
 
   MeasurementLog log;
   log.gravity_m_s2 = meta.gravity_m_s2;
   log.camera = camera.model;
   log.pixel_sigma_px = camera.pixel_sigma_px;
+  log.line_sigma_px = camera.line_sigma_px.value_or(0.0);
   log.imu_noise = read_yaml<ImuSensorFile>(folder / kImuSensor).noise;
   const ConfigTree prior = load_config_file(folder / "prior.yaml");
   log.prior = read_all_keys<InitialPrior>(prior);
@@ -272,23 +358,8 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
     log.frames.push_back({t_ns, {}});
   }
   check_prior(log, prior);
-  CsvReader points(folder / kPointsFile, 4, 2);
-  auto frame = log.frames.begin();
-  std::set<std::int64_t> seen;  // the tracks of the frame
-  while (points.next()) {
-    const TimeNs t_ns = points.integer(0);
-    for (; frame != log.frames.end() && frame->t_cam_ns < t_ns; ++frame) seen.clear();
-    if (frame == log.frames.end() || frame->t_cam_ns != t_ns) {
-      points.fail(fmt::format("frame {} is not in {}, or out of order", t_ns, kFramesFile));
-    }
-    core::PointObservation& point = frame->points.emplace_back();
-    point.track_id = points.integer(1);
-    if (!seen.insert(point.track_id).second) {
-      points.fail(fmt::format("track {} is in frame {} already", point.track_id, t_ns));
-    }
-    point.pixel = {points.number(2), points.number(3)};
-    if (points.has(4) || points.has(5)) point.velocity = {points.number(4), points.number(5)};
-  }
+  read_points(folder / kPointsFile, log.frames);
+  if (camera.line_sigma_px) read_lines(folder / kLinesFile, log.frames);
   return log;
 }
 

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "estimator/batch_problem.h"
-#include "estimator/factors/imu_increment.h"
-#include "estimator/triangulation.h"
+#include "estimator/batch_start.h"
 
 namespace plumbline::estimator {
 namespace {
@@ -18,70 +16,6 @@ constexpr double kRetimeS = 5e-3;
 // The biases' effect on a preintegrated rotation is linear to half the square of this [rad].
 constexpr double kRelineariseRad = 1e-5;
 constexpr double kFirstStageS = 2.0;
-
-std::size_t nearest_sample(const std::vector<core::ImuSample>& imu, double t_s, core::TimeNs origin_ns) {
-  const auto time = [&](const core::ImuSample& s) { return core::to_seconds(s.t_ns - origin_ns); };
-  const auto after =
-      std::lower_bound(imu.begin(), imu.end(), t_s, [&](const core::ImuSample& s, double t) { return time(s) < t; });
-  if (after == imu.begin()) return 0;
-  if (after == imu.end()) return imu.size() - 1;
-  const bool earlier = t_s - time(*(after - 1)) <= time(*after) - t_s;
-  return static_cast<std::size_t>(after - imu.begin()) - (earlier ? 1 : 0);
-}
-
-// No estimate where there is no starting point; what() is the reason.
-class NoStart : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-// Puts the states of the first `keyframes` keyframes at the samples nearest to t_cam + td, carried there by the IMU:
-// those that exist from where they were, new ones from the one before. Between two states there must be motion.
-void place_states(const BatchInput& input, std::size_t keyframes, double td_s, BatchValues& values) {
-  const std::vector<core::ImuSample>& imu = input.log.imu;
-  for (std::size_t k = 0; k < keyframes; ++k) {
-    const core::TimeNs t_cam_ns = input.log.frames[input.keyframes[k]].t_cam_ns;
-    const std::size_t sample = nearest_sample(imu, td_s, t_cam_ns);
-    if (sample <= values.samples[k]) {
-      throw NoStart(fmt::format(
-          "keyframe {}, stamped {} ns: with td = {:.6g} s no IMU sample is left for its state after that at {} ns", k,
-          t_cam_ns, td_s, imu[values.samples[k]].t_ns));
-    }
-    const std::size_t i = k + 1;
-    if (i == values.states.size()) {
-      values.states.push_back(carry(values.states[k], imu, values.samples[k], sample, input.log.gravity_m_s2));
-      values.samples.push_back(sample);
-    } else if (sample != values.samples[i]) {
-      values.states[i] = carry(values.states[i], imu, values.samples[i], sample, input.log.gravity_m_s2);
-      values.samples[i] = sample;
-    }
-  }
-}
-
-// Gives a value to each landmark without one that two of the placed keyframes have seen.
-void triangulate_missing(const BatchInput& input, BatchValues& values) {
-  const core::PinholeCamera& camera = input.log.camera;
-  const std::size_t placed = values.states.size() - 1;
-  const auto camera_pose = [&](const TrackObservation& o) -> core::Pose {
-    const core::State& state = values.states[o.keyframe + 1];
-    const std::size_t sample = values.samples[o.keyframe + 1];
-    const core::TimeNs t_cam_ns = input.log.frames[input.keyframes[o.keyframe]].t_cam_ns;
-    const double tau_s = core::to_seconds(t_cam_ns - input.log.imu[sample].t_ns) + values.calibration.td_s +
-                         core::row_phase(o.pixel.y(), camera.height_px) * values.calibration.readout_s;
-    // Constant rate over the few milliseconds from the state: good enough to start from.
-    const Eigen::Vector3d rate = input.log.imu[sample].gyro_rad_s - state.bias.gyro_rad_s;
-    const core::Pose T_W_B{state.T_W_B.q * core::exp_quaternion(rate * tau_s), state.T_W_B.p + tau_s * state.v_W};
-    return T_W_B * values.calibration.T_B_C;
-  };
-  for (std::size_t t = 0; t < input.tracks.size(); ++t) {
-    if (values.landmarks[t]) continue;
-    std::vector<View> views;
-    for (const TrackObservation& o : input.tracks[t].observations) {
-      if (o.keyframe < placed) views.push_back({camera_pose(o), o.pixel});
-    }
-    if (views.size() >= 2) values.landmarks[t] = triangulate(camera, views);
-  }
-}
 
 bool biases_left_linearisation(const BatchInput& input, const BatchValues& from, const BatchValues& to) {
   for (std::size_t i = 0; i + 1 < to.states.size(); ++i) {
@@ -118,12 +52,39 @@ void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
     const BatchProblem::Outcome outcome = problem.solve(loose);
     values = problem.values();
     // Landmarks that were triangulated from poor poses may have caught the solver; the poses are better now.
-    if (false_minimum(input, outcome.summary)) {
-      std::fill(values.landmarks.begin(), values.landmarks.end(), std::nullopt);
-    }
+    if (false_minimum(input, outcome.summary)) values.forget_landmarks();
+    // Whether a line is determined is asked anew with better poses and more views: one that is not would run off.
+    values.forget_lines();
     if (must_retime(input, values.calibration.td_s, timing_td_s)) timing_td_s = values.calibration.td_s;
     if (count == input.keyframes.size()) return;
   }
+}
+
+// Gives up the lines that a solution speaks against: wrong matches, and what the solver left behind a camera. False
+// where there is none.
+bool cull_lines(const BatchInput& input, const BatchProblem& problem, BatchValues& values) {
+  std::vector<std::size_t> tracks = problem.lines_beyond(input.config.lines.cull_sigma);
+  const std::vector<std::size_t> behind = lines_behind(input, values);
+  tracks.insert(tracks.end(), behind.begin(), behind.end());
+  for (const std::size_t track : tracks) {
+    values.lines[track].reset();
+    values.culled_lines[track] = true;
+  }
+  return !tracks.empty();
+}
+
+std::vector<core::LineEstimate> line_estimates(const BatchInput& input, const BatchValues& values) {
+  std::vector<core::LineEstimate> lines;
+  for (std::size_t t = 0; t < values.lines.size(); ++t) {
+    if (!values.lines[t]) continue;
+    const PluckerLine L = OrthonormalLine(values.lines[t]->block.data()).plucker();
+    const Eigen::Vector3d d = L.d.normalized();
+    // From the line's own origin to the world's.
+    lines.push_back({.track_id = input.line_tracks[t].id,
+                     .moment_W = L.n / L.d.norm() + values.lines[t]->origin_W.cross(d),
+                     .direction_W = d});
+  }
+  return lines;
 }
 
 core::EstimateLog failed(std::string reason) {
@@ -141,6 +102,8 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
   values.states = {log.prior.start};
   values.samples = {nearest_sample(log.imu, 0.0, log.prior.t_ns)};
   values.landmarks.resize(input.tracks.size());
+  values.lines.resize(input.line_tracks.size());
+  values.culled_lines.resize(input.line_tracks.size());
   double timing_td_s = config.state_td_s.value_or(log.prior.start_calibration.td_s);
   grow(input, values, timing_td_s);
 
@@ -166,8 +129,15 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
       // Once more with all landmarks triangulated anew and strong damping.
       restarted = true;
       values = solved;
-      std::fill(values.landmarks.begin(), values.landmarks.end(), std::nullopt);
+      values.forget_landmarks();
       continue;
+    }
+    if (outcome.status == core::SolveStatus::kConverged && round + 1 < kMaxRounds) {
+      BatchValues culled = solved;
+      if (cull_lines(input, problem, culled)) {
+        values = std::move(culled);
+        continue;
+      }
     }
     const bool retime = must_retime(input, solved.calibration.td_s, timing_td_s);
     if (!bad && (retime || biases_left_linearisation(input, values, solved)) && round + 1 < kMaxRounds) {
@@ -201,6 +171,8 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
   result.td_estimated = config.estimate.td;
   result.readout_estimated = config.estimate.readout;
   result.extrinsics_estimated = config.estimate.extrinsics;
+  result.lines = line_estimates(input, values);
+  result.line_tracks = static_cast<int>(input.line_tracks.size());
   for (std::size_t i = 0; i < values.states.size(); ++i) {
     result.states.push_back({log.imu[values.samples[i]].t_ns, values.states[i]});
   }
@@ -212,14 +184,17 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
 core::EstimateLog estimate_batch(const core::MeasurementLog& log, const EstimatorConfig& config) {
   BatchInput input{.log = log,
                    .config = config,
-                   .noise = believed_noise(config, log.imu_noise, log.pixel_sigma_px),
+                   .noise = believed_noise(config, log.imu_noise, log.pixel_sigma_px, log.line_sigma_px),
                    .keyframes = {},
                    .tracks = {}};
   input.keyframes = select_keyframes(log.frames, config.keyframe_rate_hz);
-  input.tracks = collect_tracks(log.frames, input.keyframes, log.camera);
-  if (config.timing == TimingModel::kFeatureVelocity && drop_without_velocity(input.tracks) > 0 &&
-      input.tracks.empty()) {
-    return failed("no track has the image velocities that estimator.timing = feature_velocity needs");
+  if (uses_points(config.use)) input.tracks = collect_tracks(log.frames, input.keyframes, log.camera);
+  if (uses_lines(config.use)) input.line_tracks = collect_line_tracks(log.frames, input.keyframes, log.camera);
+  if (config.timing == TimingModel::kFeatureVelocity) {
+    const int dropped = drop_without_velocity(input.tracks) + drop_without_velocity(input.line_tracks);
+    if (dropped > 0 && input.tracks.empty() && input.line_tracks.empty()) {
+      return failed("no track has the image velocities that estimator.timing = feature_velocity needs");
+    }
   }
   if (input.keyframes.size() < 2) return failed("fewer than two keyframes");
   if (log.imu.size() < 2 || log.imu.front().t_ns > log.prior.t_ns) return failed("no IMU samples at the prior's time");

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include <ceres/solver.h>
 
@@ -12,17 +13,34 @@
 #include "estimator/posterior.h"
 
 namespace plumbline::estimator {
+namespace {
+
+std::unique_ptr<ceres::LossFunction> make_loss(RobustLoss loss, double scale) {
+  switch (loss) {
+    case RobustLoss::kNone:
+      return nullptr;
+    case RobustLoss::kHuber:
+      return std::make_unique<ceres::HuberLoss>(scale);
+    case RobustLoss::kCauchy:
+      return std::make_unique<ceres::CauchyLoss>(scale);
+  }
+  throw std::logic_error("make_loss: unknown loss");
+}
+
+}  // namespace
 
 BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values)
     : input_(input),
       start_(values),
       extrinsics_(pack(values.calibration.T_B_C)),
       td_s_(values.calibration.td_s),
-      readout_s_(values.calibration.readout_s) {
+      readout_s_(values.calibration.readout_s),
+      loss_(make_loss(input.config.loss, input.config.loss_scale)) {
   for (const core::State& state : values.states) states_.push_back(pack(state));
 
   ceres::Problem::Options options;
   options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_ = std::make_unique<ceres::Problem>(options);
   for (StateBlock& state : states_) problem_->AddParameterBlock(state.data(), kStateSize, &state_manifold_);
   problem_->AddParameterBlock(extrinsics_.data(), kPoseSize, &pose_manifold_);
@@ -36,7 +54,9 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values)
   inertial_begin_ = problem_->NumResidualBlocks();
   add_inertial_factors();
   visual_begin_ = problem_->NumResidualBlocks();
-  add_points();
+  const Timings timings = frame_timings();
+  add_points(timings);
+  add_lines(timings);
 }
 
 void BatchProblem::add_priors() {
@@ -69,81 +89,6 @@ void BatchProblem::add_inertial_factors() {
   }
 }
 
-void BatchProblem::add_points() {
-  // How far observations may move from their states: what lies between them now, half the readout, and td and readout
-  // five sigma off.
-  const core::CalibrationSigmas& sigma = input_.log.prior.calibration_sigma;
-  const double sample_s = core::to_seconds(input_.log.imu[1].t_ns - input_.log.imu[0].t_ns);
-  const double margin_s = 0.5 * std::abs(readout_s_) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
-  std::vector<FrameTiming> timings;
-  for (std::size_t k = 0; k + 1 < states_.size(); ++k) {
-    const std::size_t sample = start_.samples[k + 1];
-    const core::TimeNs t_cam_ns = input_.log.frames[input_.keyframes[k]].t_cam_ns;
-    const double offset_s = core::to_seconds(t_cam_ns - input_.log.imu[sample].t_ns);
-    const double reach_s = margin_s + std::abs(offset_s + td_s_);
-    timings.push_back(
-        {std::make_shared<LocalMotion>(input_.log.imu, sample, reach_s, start_.states[k + 1].bias), offset_s});
-  }
-
-  const EstimatorConfig& config = input_.config;
-  const PointModel model{.camera = {.camera = input_.log.camera,
-                                    .pixel_sigma_px = input_.noise.pixel_sigma_px,
-                                    .gravity_m_s2 = input_.log.gravity_m_s2,
-                                    .residual = config.residual},
-                         .timing = config.timing,
-                         .landmark = config.landmark};
-  landmarks_.reserve(input_.tracks.size());  // parameter blocks must not move
-  for (std::size_t t = 0; t < input_.tracks.size(); ++t) {
-    const std::optional<Eigen::Vector3d>& start = start_.landmarks[t];
-    if (!start) continue;
-    Eigen::Vector3d& landmark = landmarks_.emplace_back(*start);
-    if (add_point(model, timings, input_.tracks[t], landmark)) {
-      landmark_tracks_.push_back(t);
-    } else {
-      landmarks_.pop_back();
-    }
-  }
-}
-
-// False, and nothing added, where a factor cannot be evaluated.
-bool BatchProblem::add_point(const PointModel& model, const std::vector<FrameTiming>& timings, const Track& track,
-                             Eigen::Vector3d& landmark) {
-  const auto view = [&](const TrackObservation& o) -> PointView { return {timings[o.keyframe], o.pixel, o.velocity}; };
-  const TrackObservation& first = track.observations.front();
-  const PointView anchor = view(first);
-  double* const landmark_values = landmark_block(landmark);
-  const auto blocks = [&](std::size_t keyframe) -> std::vector<double*> {
-    return {states_[first.keyframe + 1].data(),
-            states_[keyframe + 1].data(),
-            extrinsics_.data(),
-            &td_s_,
-            &readout_s_,
-            landmark_values};
-  };
-
-  std::vector<std::pair<std::unique_ptr<ceres::CostFunction>, std::size_t>> factors;
-  for (auto o = track.observations.begin() + 1; o != track.observations.end() && o->keyframe < timings.size(); ++o) {
-    auto factor = make_point_factor(model, anchor, view(*o));
-    Eigen::Vector2d residual;
-    if (!factor->Evaluate(blocks(o->keyframe).data(), residual.data(), nullptr)) return false;
-    factors.emplace_back(std::move(factor), o->keyframe);
-  }
-  if (factors.empty()) return false;
-  if (auto term = make_anchor_term(model, anchor, &td_s_, &readout_s_, landmark_values)) {
-    problem_->AddResidualBlock(term->factor.release(), nullptr, term->blocks);
-    ++observations_;
-  }
-  observations_ += static_cast<int>(factors.size());
-  for (auto& [factor, keyframe] : factors) {
-    problem_->AddResidualBlock(factor.release(), nullptr, blocks(keyframe));
-  }
-  return true;
-}
-
-double* BatchProblem::landmark_block(Eigen::Vector3d& landmark) const {
-  return input_.config.landmark == LandmarkType::kFixedBearing ? &landmark.z() : landmark.data();
-}
-
 BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
   ceres::Solver::Options ceres_options;
   // Tracks of seconds leave few zeros between the states of a short recording, and dense Cholesky has less to keep
@@ -157,6 +102,7 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
   ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (Eigen::Vector3d& landmark : landmarks_) ordering->AddElementToGroup(landmark_block(landmark), 0);
+  for (LineValue& line : lines_) ordering->AddElementToGroup(line.block.data(), 0);
   for (StateBlock& state : states_) ordering->AddElementToGroup(state.data(), 1);
   for (double* block : {extrinsics_.data(), &td_s_, &readout_s_}) ordering->AddElementToGroup(block, 1);
   ceres_options.linear_solver_ordering = ordering;
@@ -188,7 +134,7 @@ BatchProblem::Outcome BatchProblem::solve(const SolveOptions& options) {
                      .final_cost = ceres_summary.final_cost,
                      .residuals = ceres_summary.num_residuals_reduced,
                      .parameters = ceres_summary.num_effective_parameters_reduced,
-                     .landmarks = static_cast<int>(landmarks_.size()),
+                     .landmarks = static_cast<int>(landmarks_.size() + lines_.size()),
                      .observations = observations_,
                      .visual = residual_sum(visual_begin_, problem_->NumResidualBlocks()),
                      .inertial = residual_sum(inertial_begin_, visual_begin_),
@@ -216,8 +162,9 @@ BatchValues BatchProblem::values() const {
   BatchValues values = start_;
   values.calibration = {.T_B_C = unpack_pose(extrinsics_.data()), .td_s = td_s_, .readout_s = readout_s_};
   for (std::size_t i = 0; i < states_.size(); ++i) values.states[i] = unpack_state(states_[i].data());
-  std::fill(values.landmarks.begin(), values.landmarks.end(), std::nullopt);
+  values.forget_landmarks();
   for (std::size_t i = 0; i < landmarks_.size(); ++i) values.landmarks[landmark_tracks_[i]] = landmarks_[i];
+  for (std::size_t i = 0; i < lines_.size(); ++i) values.lines[line_tracks_[i]] = lines_[i];
   return values;
 }
 
@@ -237,6 +184,7 @@ std::optional<core::PosteriorCovariance> BatchProblem::posterior_covariance() co
   for (const Eigen::Vector3d& landmark : landmarks_) {
     blocks.push_back(landmark_block(const_cast<Eigen::Vector3d&>(landmark)));
   }
+  for (const LineValue& line : lines_) blocks.push_back(const_cast<double*>(line.block.data()));
 
   const auto covariance = leading_covariance(*problem_, blocks, static_cast<int>(wanted.size()));
   if (!covariance) return std::nullopt;

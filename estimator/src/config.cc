@@ -22,8 +22,16 @@ static void visit(core::ConfigVisitor& v, EstimateWhat& c) {
   v.value("extrinsics", c.extrinsics, "T_B_C");
 }
 
+static void visit(core::ConfigVisitor& v, LineRules& c) {
+  v.value("largest_depth_sigma", c.largest_depth_sigma, core::positive(),
+          "a line waits for more views while the inverse depth of either end is known worse than this share of itself");
+  v.value("cull_sigma", c.cull_sigma, core::positive(),
+          "a line is given up where a solution leaves an end further from it than this many sigmas");
+}
+
 void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.choice("type", c.type, kEstimatorTypeNames, "`batch`: full maximum a posteriori");
+  v.choice("use", c.use, kObservationUseNames, "which observations enter");
   v.choice("timing", c.timing, kTimingModelNames,
            "camera timing; `propagated`: the pose at the observation's own time, by the IMU; `feature_velocity`: the "
            "observation moved along its image velocity (VINS-Mono)");
@@ -38,21 +46,29 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.value("keyframe_rate_hz", c.keyframe_rate_hz, core::positive_up_to(core::kMostFrequencyHz),
           "only keyframes' observations enter");
   v.value("pixel_sigma_px", c.pixel_sigma_px, sigma_up_to(core::kMostPixels), "scenario", "pixel noise it believes in");
+  v.value("line_sigma_px", c.line_sigma_px, sigma_up_to(core::kMostPixels), "scenario",
+          "pixel noise of the ends of segments it believes in; must be given where the scenario's is 0 and lines are "
+          "used");
+  v.choice("loss", c.loss, kRobustLossNames, "of points and lines; with one neither NEES nor efficiency is claimed");
+  v.value("loss_scale", c.loss_scale, core::positive(), "the length of a whitened residual at which the loss sets in");
   v.value("state_td_s", c.state_td_s, core::within(core::kMostTimeOffsetS), "estimate",
           "td by which the states lie at the frames; `estimate`: the prior's, and anew where td has left it by 5 ms");
   v.section("imu", c.imu, "IMU noise it believes in; must be given where the scenario's is 0");
   v.section("estimate", c.estimate, "what is free; the rest is held at the prior's mean");
+  v.section("lines", c.lines, "which lines are estimated");
   v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");
   v.value("max_cost_per_dof", c.max_cost_per_dof, core::positive(),
           "a mean squared whitened residual above it is a false minimum: a failed trial");
 }
 
-BelievedNoise believed_noise(const EstimatorConfig& config, const core::ImuNoise& imu_noise, double pixel_sigma_px) {
+BelievedNoise believed_noise(const EstimatorConfig& config, const core::ImuNoise& imu_noise, double pixel_sigma_px,
+                             double line_sigma_px) {
   return {.imu = {.gyro_noise_density = config.imu.gyro_noise_density.value_or(imu_noise.gyro_noise_density),
                   .gyro_bias_walk = config.imu.gyro_bias_walk.value_or(imu_noise.gyro_bias_walk),
                   .accel_noise_density = config.imu.accel_noise_density.value_or(imu_noise.accel_noise_density),
                   .accel_bias_walk = config.imu.accel_bias_walk.value_or(imu_noise.accel_bias_walk)},
-          .pixel_sigma_px = config.pixel_sigma_px.value_or(pixel_sigma_px)};
+          .pixel_sigma_px = config.pixel_sigma_px.value_or(pixel_sigma_px),
+          .line_sigma_px = config.line_sigma_px.value_or(line_sigma_px)};
 }
 
 }  // namespace plumbline::estimator

@@ -1,5 +1,6 @@
 #include "estimator/estimate.h"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -40,9 +41,12 @@ std::optional<std::string> gap_in_imu(const std::vector<core::ImuSample>& imu) {
 
 }  // namespace
 
-void require_usable(const BelievedNoise& noise, const core::CalibrationSigmas& sigma, const EstimateWhat& free) {
+void require_usable(const EstimatorConfig& config, const BelievedNoise& noise, const core::CalibrationSigmas& sigma,
+                    bool has_lines) {
+  const EstimateWhat& free = config.estimate;
   const std::string_view fallback = "it defaults to the scenario's, which";
-  require_weight(noise.pixel_sigma_px, "estimator.pixel_sigma_px", fallback);
+  if (uses_points(config.use)) require_weight(noise.pixel_sigma_px, "estimator.pixel_sigma_px", fallback);
+  if (uses_lines(config.use) && has_lines) require_weight(noise.line_sigma_px, "estimator.line_sigma_px", fallback);
   require_weight(noise.imu.gyro_noise_density, "estimator.imu.gyro_noise_density_rad_s_sqrt_hz", fallback);
   require_weight(noise.imu.gyro_bias_walk, "estimator.imu.gyro_bias_walk_rad_s2_sqrt_hz", fallback);
   require_weight(noise.imu.accel_noise_density, "estimator.imu.accel_noise_density_m_s2_sqrt_hz", fallback);
@@ -57,8 +61,10 @@ void require_usable(const BelievedNoise& noise, const core::CalibrationSigmas& s
 }
 
 core::EstimateLog estimate(const core::MeasurementLog& log, const EstimatorConfig& config) {
-  require_usable(believed_noise(config, log.imu_noise, log.pixel_sigma_px), log.prior.calibration_sigma,
-                 config.estimate);
+  const bool has_lines =
+      std::any_of(log.frames.begin(), log.frames.end(), [](const core::Frame& frame) { return !frame.lines.empty(); });
+  require_usable(config, believed_noise(config, log.imu_noise, log.pixel_sigma_px, log.line_sigma_px),
+                 log.prior.calibration_sigma, has_lines);
   if (auto reason = gap_in_imu(log.imu)) {
     core::EstimateLog failed;
     failed.status = core::SolveStatus::kFailedInitialisation;

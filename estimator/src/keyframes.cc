@@ -20,31 +20,66 @@ std::vector<std::size_t> select_keyframes(const std::vector<core::Frame>& frames
   return keyframes;
 }
 
-std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes,
-                                  const core::PinholeCamera& camera) {
-  std::map<std::int64_t, Track> by_id;
+namespace {
+
+// Tracks of two observations or more. visit(frame, add) calls add(track_id, observation) for each of a frame's.
+template <class Observation, class Visit>
+std::vector<TrackOf<Observation>> collect(const std::vector<core::Frame>& frames,
+                                          const std::vector<std::size_t>& keyframes, const Visit& visit) {
+  std::map<std::int64_t, TrackOf<Observation>> by_id;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
-    for (const core::PointObservation& point : frames[keyframes[k]].points) {
-      if (!camera.try_unproject(point.pixel)) continue;
-      Track& track = by_id[point.track_id];
-      track.id = point.track_id;
-      track.observations.push_back({k, point.pixel, point.velocity});
-    }
+    visit(frames[keyframes[k]], [&](std::int64_t id, Observation observation) {
+      TrackOf<Observation>& track = by_id[id];
+      track.id = id;
+      observation.keyframe = k;
+      track.observations.push_back(std::move(observation));
+    });
   }
-  std::vector<Track> tracks;
+  std::vector<TrackOf<Observation>> tracks;
   for (auto& [id, track] : by_id) {
     if (track.observations.size() >= 2) tracks.push_back(std::move(track));
   }
   return tracks;
 }
 
-int drop_without_velocity(std::vector<Track>& tracks) {
+template <class Observation>
+std::size_t drop_if(std::vector<TrackOf<Observation>>& tracks, bool (*unusable)(const Observation&)) {
   std::size_t dropped = 0;
-  for (Track& track : tracks) {
-    dropped += std::erase_if(track.observations, [](const TrackObservation& o) { return !o.velocity; });
-  }
-  std::erase_if(tracks, [](const Track& track) { return track.observations.size() < 2; });
-  return static_cast<int>(dropped);
+  for (auto& track : tracks) dropped += std::erase_if(track.observations, unusable);
+  std::erase_if(tracks, [](const TrackOf<Observation>& track) { return track.observations.size() < 2; });
+  return dropped;
+}
+
+}  // namespace
+
+std::vector<Track> collect_tracks(const std::vector<core::Frame>& frames, const std::vector<std::size_t>& keyframes,
+                                  const core::PinholeCamera& camera) {
+  return collect<TrackObservation>(frames, keyframes, [&](const core::Frame& frame, const auto& add) {
+    for (const core::PointObservation& point : frame.points) {
+      if (camera.try_unproject(point.pixel)) add(point.track_id, TrackObservation{0, point.pixel, point.velocity});
+    }
+  });
+}
+
+std::vector<LineTrack> collect_line_tracks(const std::vector<core::Frame>& frames,
+                                           const std::vector<std::size_t>& keyframes,
+                                           const core::PinholeCamera& camera) {
+  return collect<LineTrackObservation>(frames, keyframes, [&](const core::Frame& frame, const auto& add) {
+    for (const core::LineObservation& line : frame.lines) {
+      if (!camera.try_unproject(line.ends_px[0]) || !camera.try_unproject(line.ends_px[1])) continue;
+      add(line.track_id, LineTrackObservation{0, line.ends_px, line.velocities});
+    }
+  });
+}
+
+int drop_without_velocity(std::vector<Track>& tracks) {
+  return static_cast<int>(
+      drop_if<TrackObservation>(tracks, [](const TrackObservation& o) { return !o.velocity.has_value(); }));
+}
+
+int drop_without_velocity(std::vector<LineTrack>& tracks) {
+  return static_cast<int>(
+      drop_if<LineTrackObservation>(tracks, [](const LineTrackObservation& o) { return !o.velocities.has_value(); }));
 }
 
 }  // namespace plumbline::estimator

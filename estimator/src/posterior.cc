@@ -10,7 +10,6 @@ std::optional<Eigen::MatrixXd> leading_covariance(ceres::Problem& problem, const
                                                   int leading) {
   ceres::Problem::EvaluateOptions options;
   options.parameter_blocks = blocks;
-  options.apply_loss_function = false;
   options.num_threads = 1;
   ceres::CRSMatrix crs;
   if (!problem.Evaluate(options, nullptr, nullptr, nullptr, &crs)) return std::nullopt;

@@ -3,21 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
-#include <memory>
 #include <stdexcept>
 
-#include <Eigen/Eigenvalues>
-
 #include "estimator/factors/imu_factor.h"
-#include "estimator/factors/world_point.h"
 #include "eval/information_chain.h"
+#include "visual_linearisation.h"
 
 namespace plumbline::eval {
 namespace {
 
 using core::kStateDof;
-using estimator::LocalMotion;
 using Variable = InformationChain::Variable;
 using StateVector = Eigen::Matrix<double, kStateDof, 1>;
 
@@ -28,25 +23,11 @@ StateVector state_units() {
       Eigen::Vector3d::Constant(1e-4), Eigen::Vector3d::Constant(1e-2);
   return u;
 }
-constexpr int kCalibrationDof = 8;  // the first rows of core::PosteriorCovariance
 Eigen::Matrix<double, kCalibrationDof, 1> calibration_units() {
   Eigen::Matrix<double, kCalibrationDof, 1> u;
   u << Eigen::Vector3d::Constant(1e-3), Eigen::Vector3d::Constant(1e-3), 1e-4, 1e-4;
   return u;
 }
-
-struct Observation {
-  int track = 0;
-  estimator::WorldPointJacobians J;
-};
-
-struct TrackInfo {
-  std::size_t last_frame = 0;  // index into the options' frames
-  int observations = 0;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // on P_W, all else known
-  Eigen::MatrixXd basis;                                  // P_W = ... + basis x
-  Variable variable = -1;
-};
 
 class Builder {
  public:
@@ -59,7 +40,8 @@ class Builder {
       if (is_free[static_cast<std::size_t>(i)]) free_.push_back(i);
     }
     place_states();
-    linearise_observations();
+    visual_ = linearise_visual(log_, truth_, options_, {imu_, samples_, true_states_});
+    landmarks_.assign(visual_.tracks.size(), -1);
   }
 
   CramerRaoBound build() {
@@ -98,57 +80,6 @@ class Builder {
   const core::State& state(std::size_t i) const { return true_states_[i]; }
   core::TimeNs stamp(std::size_t i) const { return log_.imu[samples_[i]].t_ns; }
 
-  void linearise_observations() {
-    const estimator::CameraModel model{log_.camera, log_.pixel_sigma_px, log_.gravity_m_s2};
-    // The gap from a state to a row is at most half a readout and half an IMU interval.
-    const double reach_s = 0.5 * std::abs(truth_.calibration.readout_s) + 0.05;
-    std::map<std::int64_t, int> index;
-    observations_.resize(options_.frames.size());
-    double gap_sum_s = 0.0;
-    int count = 0;
-    for (std::size_t k = 0; k < options_.frames.size(); ++k) {
-      const core::Frame& frame = log_.frames[options_.frames[k]];
-      const core::State& x = state(k + 1);
-      const auto motion = std::make_shared<LocalMotion>(imu_, samples_[k + 1], reach_s, x.bias);
-      const estimator::FrameTiming timing{motion, core::to_seconds(frame.t_cam_ns - stamp(k + 1))};
-      for (const core::PointObservation& point : frame.points) {
-        const auto landmark = truth_.track_landmark.find(point.track_id);
-        if (landmark == truth_.track_landmark.end()) continue;  // a false track has no truth
-        const Eigen::Vector3d& P_W = truth_.landmarks_W[static_cast<std::size_t>(landmark->second)];
-        estimator::WorldPointJacobians J;
-        const auto seen =
-            estimator::observe_world_point(model, timing, x, truth_.calibration, P_W, point.pixel.y(), &J);
-        if (!seen) continue;
-        const auto [entry, is_new] = index.try_emplace(point.track_id, static_cast<int>(tracks_.size()));
-        if (is_new) tracks_.emplace_back();
-        TrackInfo& track = tracks_[static_cast<std::size_t>(entry->second)];
-        ++track.observations;
-        track.last_frame = k;
-        track.information += J.point.transpose() * J.point;
-        observations_[k].push_back({entry->second, J});
-        gap_sum_s += std::abs(seen->tau_s);
-        ++count;
-      }
-    }
-    // A point that is seen once says nothing of the motion: its two rows are spent on itself.
-    for (TrackInfo& track : tracks_) {
-      if (track.observations >= 2) track.basis = observed_directions(track.information);
-    }
-    mean_gap_s_ = count > 0 ? gap_sum_s / count : 0.0;
-    per_frame_ = static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(1, options_.frames.size()));
-  }
-
-  // Scaled so that the information on them is the identity.
-  static Eigen::MatrixXd observed_directions(const Eigen::Matrix3d& information) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(information);
-    // Rounding leaves about 1e-15 of the largest eigenvalue where there is no parallax at all.
-    const double least = 1e-12 * eigen.eigenvalues()(2);
-    int first = 0;
-    while (eigen.eigenvalues()(first) < least) ++first;
-    return eigen.eigenvectors().rightCols(3 - first) *
-           eigen.eigenvalues().tail(3 - first).cwiseSqrt().cwiseInverse().asDiagonal();
-  }
-
   void add_priors() {
     states_.push_back(chain_.add(kStateDof));
     const StateVector sigma = log_.prior.sigma.per_axis();
@@ -184,37 +115,35 @@ class Builder {
     chain_.observe({states_[i], states_[i + 1]}, J);
   }
 
-  void add_observation(std::size_t k, const Observation& observation) {
-    TrackInfo& track = tracks_[static_cast<std::size_t>(observation.track)];
-    if (track.basis.cols() == 0) return;
-    if (track.variable < 0) {
-      track.variable = chain_.add(static_cast<int>(track.basis.cols()));
+  void add_observation(std::size_t k, const VisualObservation& observation) {
+    VisualTrack& track = visual_.tracks[static_cast<std::size_t>(observation.track)];
+    if (track.dof == 0) return;
+    Variable& variable = landmarks_[static_cast<std::size_t>(observation.track)];
+    if (variable < 0) {
+      variable = chain_.add(track.dof);
       alive_.push_back(observation.track);
     }
     const auto n_free = static_cast<Eigen::Index>(free_.size());
-    Eigen::MatrixXd J(2, kStateDof + n_free + track.basis.cols());
-    J.leftCols(kStateDof) = observation.J.state * state_units().asDiagonal();
-    Eigen::Matrix<double, 2, kCalibrationDof> calibration;
-    calibration << observation.J.extrinsics, observation.J.td, observation.J.readout;
-    J.middleCols(kStateDof, n_free) = (calibration * calibration_units().asDiagonal())(Eigen::all, free_);
-    J.rightCols(track.basis.cols()) = observation.J.point * track.basis;
+    Eigen::MatrixXd J(2, kStateDof + n_free + track.dof);
+    J.leftCols(kStateDof) = observation.state * state_units().asDiagonal();
+    J.middleCols(kStateDof, n_free) = (observation.calibration * calibration_units().asDiagonal())(Eigen::all, free_);
+    J.rightCols(track.dof) = observation.landmark;
     std::vector<Variable> variables = {states_[k + 1]};
     if (n_free > 0) variables.push_back(calibration_);
-    variables.push_back(track.variable);
+    variables.push_back(variable);
     chain_.observe(variables, J);
   }
 
   void add_frame(std::size_t k) {
     states_.push_back(chain_.add(kStateDof));
     add_inertial(k);
-    for (const Observation& observation : observations_[k]) add_observation(k, observation);
+    for (const VisualObservation& observation : visual_.frames[k]) add_observation(k, observation);
     if (options_.causal) add_causal(k);
 
     std::vector<Variable> done = {states_[k]};
     std::erase_if(alive_, [&](int t) {
-      const TrackInfo& track = tracks_[static_cast<std::size_t>(t)];
-      if (track.last_frame != k) return false;
-      done.push_back(track.variable);
+      if (visual_.tracks[static_cast<std::size_t>(t)].last_frame != k) return false;
+      done.push_back(landmarks_[static_cast<std::size_t>(t)]);
       return true;
     });
     chain_.eliminate(done);
@@ -241,7 +170,7 @@ class Builder {
   void add_causal(std::size_t k) {
     std::vector<Variable> weak;
     weak.reserve(alive_.size());
-    for (const int t : alive_) weak.push_back(tracks_[static_cast<std::size_t>(t)].variable);
+    for (const int t : alive_) weak.push_back(landmarks_[static_cast<std::size_t>(t)]);
     const Layout l = layout();
     const Eigen::MatrixXd scaled = chain_.causal_covariance(calibration_and(states_[k + 1]), weak);
     CausalBound causal{.t_ns = stamp(k + 1)};
@@ -283,26 +212,30 @@ class Builder {
   }
 
   void add_kappa2() {
-    const double pixels = log_.imu_noise.gyro_noise_density * log_.camera.fx_px / log_.pixel_sigma_px;
-    bound_.kappa2 = pixels * pixels * mean_gap_s_ * per_frame_;
+    const auto kappa2 = [&](const VisualGaps& gaps, double sigma_px) {
+      if (gaps.observations == 0) return 0.0;
+      const double pixels = log_.imu_noise.gyro_noise_density * log_.camera.fx_px / sigma_px;
+      const double mean_gap_s = gaps.sum_s / gaps.observations;
+      return pixels * pixels * mean_gap_s *
+             (static_cast<double>(gaps.observations) / static_cast<double>(options_.frames.size()));
+    };
+    bound_.kappa2 = kappa2(visual_.point_gaps, log_.pixel_sigma_px) + kappa2(visual_.line_gaps, log_.line_sigma_px);
   }
 
   const core::MeasurementLog& log_;
   const sim::GroundTruth& truth_;
   const BoundOptions& options_;
   std::vector<core::ImuSample> imu_;
-  std::vector<int> free_;                               // rows of the calibration that are free
-  std::vector<std::size_t> samples_;                    // of the states, in the log
-  std::vector<core::State> true_states_;                // there
-  std::vector<std::vector<Observation>> observations_;  // of each frame
-  std::vector<TrackInfo> tracks_;
-  double mean_gap_s_ = 0.0;
-  double per_frame_ = 0.0;
+  std::vector<int> free_;                 // rows of the calibration that are free
+  std::vector<std::size_t> samples_;      // of the states, in the log
+  std::vector<core::State> true_states_;  // there
+  VisualLinearisation visual_;
 
   InformationChain chain_;
   Variable calibration_ = -1;
   std::vector<Variable> states_;
-  std::vector<int> alive_;  // tracks
+  std::vector<Variable> landmarks_;  // of the tracks; -1 before their first observation
+  std::vector<int> alive_;           // tracks
   std::vector<CausalBound> causal_;
   std::vector<Eigen::MatrixXd> marginals_;
   CramerRaoBound bound_;

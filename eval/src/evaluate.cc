@@ -12,6 +12,7 @@
 
 #include "core/lie.h"
 #include "core/state.h"
+#include "eval/line_error.h"
 #include "eval/nees.h"
 #include "eval/trajectory_error.h"
 
@@ -216,6 +217,14 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
   for (const auto& [name, sum] :
        {std::pair("nis_visual", estimate.summary.visual), std::pair("nis_inertial", estimate.summary.inertial)}) {
     if (sum.residuals > 0) result.metrics.push_back({name, sum.squares / sum.residuals});
+  }
+  if (estimate.line_tracks > 0) {
+    const LineErrors lines = line_errors(estimate, truth);
+    if (lines.lines > 0) {
+      result.metrics.push_back({std::string(kLineAngle), lines.angle_deg});
+      result.metrics.push_back({std::string(kLineDistance), lines.distance_m});
+    }
+    result.metrics.push_back({std::string(kLineShare), lines.share});
   }
   if (auto convergence = td_convergence(estimate, truth.calibration.td_s, config.td_bound_s)) {
     result.metrics.push_back(std::move(*convergence));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -125,9 +126,17 @@ std::optional<NisSummary> summarise_nis(const std::vector<const Row*>& rows) {
   return summary;
 }
 
+// Where some of the rows have the errors of lines and others none, they are taken from all.
+void keep_line_errors_of_all(std::vector<Row>& rows) {
+  const auto is_line_error = [](const Metric& m) { return m.name == kLineAngle || m.name == kLineDistance; };
+  const auto has = [&](const Row& row) { return std::any_of(row.metrics.begin(), row.metrics.end(), is_line_error); };
+  if (std::all_of(rows.begin(), rows.end(), has)) return;
+  for (Row& row : rows) std::erase_if(row.metrics, is_line_error);
+}
+
 }  // namespace
 
-CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes) {
+CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes, const std::string& no_claim) {
   CellSummary cell{.axes = std::move(axes),
                    .n = static_cast<int>(rows.size()),
                    .n_ok = 0,
@@ -135,15 +144,17 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
                    .td_convergence = {},
                    .nis = {},
                    .note = {}};
+  std::vector<Row> rows_ok;
+  std::copy_if(rows.begin(), rows.end(), std::back_inserter(rows_ok), [](const Row& row) { return row.ok; });
+  cell.n_ok = static_cast<int>(rows_ok.size());
+  if (rows_ok.empty()) return cell;
+  keep_line_errors_of_all(rows_ok);
   std::vector<const Row*> ok;
-  for (const Row& row : rows) {
-    if (row.ok) ok.push_back(&row);
-  }
-  cell.n_ok = static_cast<int>(ok.size());
-  if (ok.empty()) return cell;
+  for (const Row& row : rows_ok) ok.push_back(&row);
   for (const Row* row : ok) require_same_metrics(*ok.front(), *row);
 
   const bool all_ok = cell.n_ok == cell.n;
+  const bool may_claim = all_ok && no_claim.empty();
   const bool short_gaps = gaps_are_short(ok);
   bool has_nees = false;
   bool has_bound = false;
@@ -162,14 +173,16 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes)
     }
     cell.metrics.push_back(summarise_values(first.name, values));
     MetricSummary& metric = cell.metrics.back();
-    metric.bound = summarise_bound(ok, i, metric, all_ok && short_gaps);
-    if (all_ok && !nees.empty()) metric.nees = summarise_nees(nees, first.nees_dof);
+    metric.bound = summarise_bound(ok, i, metric, may_claim && short_gaps);
+    if (may_claim && !nees.empty()) metric.nees = summarise_nees(nees, first.nees_dof);
     has_nees = has_nees || !nees.empty();
     has_bound = has_bound || metric.bound.has_value();
   }
-  if (all_ok && has_nees) cell.nis = summarise_nis(ok);
+  if (may_claim && has_nees) cell.nis = summarise_nis(ok);
   if (!all_ok && (has_nees || has_bound)) {
     cell.note = fmt::format("no NEES or efficiency is claimed: {} of {} trials failed", cell.n - cell.n_ok, cell.n);
+  } else if (!no_claim.empty()) {
+    cell.note = fmt::format("no NEES or efficiency is claimed: {}", no_claim);
   } else if (has_bound && !short_gaps) {
     cell.note =
         fmt::format("no efficiency is claimed: the bound neglects too much, kappa2 is above {}", kLargestKappa2);

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "sim/frame_view.h"
+#include "sim/line_sensor.h"
 #include "sim/pixel_noise.h"
 
 namespace plumbline::sim {
@@ -85,6 +86,19 @@ double cut_normal(const core::RandomStream& stream, std::uint64_t index) {
   return std::clamp(stream.normal(index), -4.0, 4.0);
 }
 
+void record(const std::vector<LineReport>& reports, core::Frame& frame, CameraRecording& recording) {
+  for (const LineReport& r : reports) {
+    const auto& [first, second] = r.ends;
+    frame.lines.push_back(r.observation);
+    recording.track_segment.emplace(r.observation.track_id, r.track_segment);
+    recording.line_ends.push_back({.frame_ns = frame.t_cam_ns,
+                                   .track_id = r.observation.track_id,
+                                   .segment = r.segment,
+                                   .t_imu_s = {first.exposure.t_imu_s, second.exposure.t_imu_s},
+                                   .ends_px = {first.exposure.pixel, second.exposure.pixel}});
+  }
+}
+
 }  // namespace
 
 CameraRecording simulate_camera(const Trajectory& trajectory, const World& world, const ScenarioConfig& config,
@@ -102,6 +116,7 @@ CameraRecording simulate_camera(const Trajectory& trajectory, const World& world
 
   CameraRecording recording;
   Tracker tracker(world, config, id);
+  LineSensor lines(world, config, id);
   const auto first_frame = static_cast<std::int64_t>(std::ceil(first_s * camera.rate_hz));
   const auto last_frame = static_cast<std::int64_t>(std::floor(last_s * camera.rate_hz));
   for (std::int64_t n = first_frame; n <= last_frame; ++n) {
@@ -127,7 +142,10 @@ CameraRecording simulate_camera(const Trajectory& trajectory, const World& world
       }
       recording.track_landmark.emplace(track.id, track.landmark);
     }
-    if (!dropped) recording.frames.push_back(std::move(frame));
+    const std::vector<LineReport> reports = lines.observe(view, index);
+    if (dropped) continue;
+    record(reports, frame, recording);
+    recording.frames.push_back(std::move(frame));
   }
   return recording;
 }

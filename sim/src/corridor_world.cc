@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "sim/wall_landmarks.h"
 #include "sim/world.h"
@@ -142,6 +143,7 @@ World corridor_world(const ScenarioConfig& scenario, const Trajectory& trajector
     faces.push_back(turned_round(level_face(corner, u, v, top_z)));
   }
   world.points_W = scatter_on(faces, config.landmarks, core::RandomStream(id.shared(), "world/corridor"));
+  world.faces = std::move(faces);
   return world;
 }
 

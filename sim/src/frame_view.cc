@@ -33,6 +33,7 @@ FrameView::FrameView(const Trajectory& trajectory, const core::PinholeCamera& ca
     : trajectory_(trajectory), camera_(camera), calibration_(calibration), t_middle_s_(t_cam_s + calibration.td_s) {
   const Kinematics k = trajectory.at(t_middle_s_);
   const core::Pose T_W_C = k.T_W_B * calibration.T_B_C;
+  T_W_C_middle_ = T_W_C;
   T_C_W_middle_ = T_W_C.inverse();
   const Eigen::Vector3d v_W = k.v_W + k.T_W_B.q * k.omega_B.cross(calibration.T_B_C.p);
   v_C_ = T_C_W_middle_.q * v_W;
@@ -49,28 +50,50 @@ core::Pose FrameView::camera_pose_at(double t_imu_s) const { return trajectory_.
 
 bool FrameView::may_see(const Eigen::Vector3d& P_W, double nearest_m, double farthest_m) const {
   const Eigen::Vector3d P_C = T_C_W_middle_ * P_W;
-  const double margin_m = reach_m_ + turn_rad_ * P_C.norm();
+  const double margin_m = reach_m(P_C.norm());
   if (P_C.z() < nearest_m - margin_m || P_C.z() > farthest_m + margin_m) return false;
   return P_C.z() + reach_m_ > cos_half_angle_ * (P_C.norm() - reach_m_);
+}
+
+std::optional<FrameView::MiddleRow> FrameView::at_middle_row(const Eigen::Vector3d& P_W) const {
+  const double s_per_row = calibration_.readout_s / camera_.height_px;
+  const double middle_row = 0.5 * camera_.height_px;
+  Eigen::Matrix<double, 2, 3> J;
+  MiddleRow m;
+  m.P_C = T_C_W_middle_ * P_W;
+  const auto pixel = camera_.project(m.P_C, &J);
+  if (!pixel) return std::nullopt;
+  m.pixel = *pixel;
+  // dP_C/dt = -v_C - omega_C x P_C
+  m.P_C_dot = -v_C_ - omega_C_.cross(m.P_C);
+  m.flow = J * m.P_C_dot;
+  m.slope = 1.0 - m.flow.y() * s_per_row;
+  // The picture of a landmark that moves as fast as the shutter has no unique row.
+  if (m.slope < 0.2) return std::nullopt;
+  m.row = middle_row + (m.pixel.y() - middle_row) / m.slope;
+  return m;
+}
+
+std::optional<Exposure> FrameView::glance(const Eigen::Vector3d& P_W) const {
+  const auto m = at_middle_row(P_W);
+  if (!m) return std::nullopt;
+  const double dt_s = (m->row / camera_.height_px - 0.5) * calibration_.readout_s;
+  const Eigen::Vector3d camera_C = v_C_ * dt_s;
+  return Exposure{.pixel = m->pixel + dt_s * m->flow,
+                  .t_imu_s = t_middle_s_ + dt_s,
+                  .depth_m = m->P_C.z() + dt_s * m->P_C_dot.z(),
+                  .camera_W = T_W_C_middle_ * camera_C};
 }
 
 std::optional<Exposure> FrameView::expose(const Eigen::Vector3d& P_W) const {
   const double s_per_row = calibration_.readout_s / camera_.height_px;
   const double middle_row = 0.5 * camera_.height_px;
-
-  Eigen::Matrix<double, 2, 3> J;
-  const Eigen::Vector3d P_C_middle = T_C_W_middle_ * P_W;
-  const auto middle = camera_.project(P_C_middle, &J);
-  if (!middle) return std::nullopt;
-  // dP_C/dt = -v_C - omega_C x P_C
-  const double flow_rows_s = J.row(1).dot(-v_C_ - omega_C_.cross(P_C_middle));
-  const double slope = 1.0 - flow_rows_s * s_per_row;
-  // The picture of a landmark that moves as fast as the shutter has no unique row.
-  if (slope < 0.2) return std::nullopt;
+  const auto m = at_middle_row(P_W);
+  if (!m) return std::nullopt;
 
   constexpr int kMaxIterations = 50;
   constexpr double kToleranceS = 1e-12;
-  double v = middle_row + (middle->y() - middle_row) / slope;
+  double v = m->row;
   for (int i = 0; i < kMaxIterations; ++i) {
     const double t = t_middle_s_ + (v - middle_row) * s_per_row;
     const core::Pose T_W_C = camera_pose_at(t);
@@ -81,7 +104,7 @@ std::optional<Exposure> FrameView::expose(const Eigen::Vector3d& P_W) const {
     if (std::abs(defect * s_per_row) < kToleranceS) {
       return Exposure{.pixel = *pixel, .t_imu_s = t, .depth_m = P_C.z(), .camera_W = T_W_C.p};
     }
-    v += defect / slope;
+    v += defect / m->slope;
   }
   return std::nullopt;
 }

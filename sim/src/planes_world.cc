@@ -68,6 +68,7 @@ World planes_world(const ScenarioConfig& scenario, const Trajectory& trajectory,
   }
   world.points_W =
       scatter_on(world.walls.walls, config.landmarks, core::RandomStream(id.shared(), "world/planes_landmarks"));
+  world.faces = world.walls.walls;
   return world;
 }
 

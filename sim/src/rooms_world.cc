@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -153,6 +154,7 @@ World rooms_world(const ScenarioConfig& scenario, const Trajectory& trajectory, 
   faces.push_back(level_face({x0, y0}, {x1 - x0, 0.0}, {0.0, y1 - y0}, bottom_z));
   faces.push_back(turned_round(level_face({x0, y0}, {x1 - x0, 0.0}, {0.0, y1 - y0}, top_z)));
   world.points_W = scatter_on(faces, config.landmarks, core::RandomStream(id.shared(), "world/rooms"));
+  world.faces = std::move(faces);
   return world;
 }
 

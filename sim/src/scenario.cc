@@ -22,8 +22,9 @@ void visit(core::ConfigVisitor& v, ScenarioConfig& c) {
   v.section("trajectory", c.trajectory, "how the body moves");
   v.section("imu", c.imu, "the inertial sensor");
   v.section("camera", c.camera, "the camera and how it is mounted");
-  v.section("world", c.world, "the landmarks that there are");
-  v.section("points", c.points, "the tracks of them");
+  v.section("world", c.world, "the landmarks and segments that there are");
+  v.section("points", c.points, "the tracks of landmarks");
+  v.section("lines", c.lines, "the tracks of segments");
   v.section("prior", c.prior, "what the estimator is told beforehand");
 }
 
@@ -36,7 +37,12 @@ std::optional<core::RuleViolation> validate(const ScenarioConfig& c) {
   if (auto violation = in("imu", validate(c.imu))) return violation;
   if (auto violation = in("camera", validate(c.camera))) return violation;
   if (auto violation = in("world", validate(c.world))) return violation;
-  return in("points", validate(c.points));
+  if (auto violation = in("points", validate(c.points))) return violation;
+  if (auto violation = in("lines", validate(c.lines))) return violation;
+  if (c.lines.per_frame > 0 && !c.world.has_lines()) {
+    return core::RuleViolation{"lines.per_frame", "must be 0 in a world without segments (world.lines)"};
+  }
+  return std::nullopt;
 }
 
 }  // namespace plumbline::sim

@@ -22,7 +22,7 @@ struct Sample {
 };
 
 // A run of poses, [first, last] of the file.
-struct Segment {
+struct Piece {
   std::size_t first;
   std::size_t last;
 };
@@ -32,9 +32,9 @@ double seconds_between(const core::StampedPose& a, const core::StampedPose& b) {
 }
 
 // The longest run without a gap wider than largest_gap_s.
-Segment longest_segment(const std::vector<core::StampedPose>& poses, double largest_gap_s) {
-  Segment longest{0, 0};
-  Segment run{0, 0};
+Piece longest_piece(const std::vector<core::StampedPose>& poses, double largest_gap_s) {
+  Piece longest{0, 0};
+  Piece run{0, 0};
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const bool gap = seconds_between(poses[i - 1], poses[i]) > largest_gap_s;
     run = {gap ? i : run.first, i};
@@ -45,14 +45,14 @@ Segment longest_segment(const std::vector<core::StampedPose>& poses, double larg
   return longest;
 }
 
-std::vector<Sample> samples_in_span(const std::vector<core::StampedPose>& poses, const Segment& segment,
+std::vector<Sample> samples_in_span(const std::vector<core::StampedPose>& poses, const Piece& piece,
                                     const TrajectoryConfig& config, double begin_s, double end_s) {
   std::vector<Sample> samples;
-  for (std::size_t i = segment.first; i <= segment.last; ++i) {
+  for (std::size_t i = piece.first; i <= piece.last; ++i) {
     const double since_first_s = seconds_between(poses.front(), poses[i]);
-    const double t = seconds_between(poses[segment.first], poses[i]) - config.start_s;
+    const double t = seconds_between(poses[piece.first], poses[i]) - config.start_s;
     // The gap before this pose counts if any of it lies in the span, even where neither of its poses does.
-    const double gap_s = i == segment.first ? 0.0 : seconds_between(poses[i - 1], poses[i]);
+    const double gap_s = i == piece.first ? 0.0 : seconds_between(poses[i - 1], poses[i]);
     if (gap_s > config.largest_gap_s && t > begin_s && t - gap_s < end_s) {
       throw core::DataError(fmt::format(
           "{}: gap of {:.3f} s between the poses at {:.3f} s and {:.3f} s after the first; "
@@ -64,7 +64,7 @@ std::vector<Sample> samples_in_span(const std::vector<core::StampedPose>& poses,
   if (samples.size() < 2) {
     throw core::DataError(fmt::format("{}: no poses at scenario.trajectory.start_s = {}; {:.3f} s of poses are there",
                                       config.file.generic_string(), config.start_s,
-                                      seconds_between(poses[segment.first], poses[segment.last])));
+                                      seconds_between(poses[piece.first], poses[piece.last])));
   }
   return samples;
 }
@@ -182,11 +182,11 @@ class Fitter {
 }  // namespace
 
 SplineFit fit_spline(const std::vector<core::StampedPose>& poses, const TrajectoryConfig& config, double duration_s) {
-  const Segment segment = config.on_gap == OnGap::kLongestSegment ? longest_segment(poses, config.largest_gap_s)
-                                                                  : Segment{0, poses.size() - 1};
-  const PoseSpan span{seconds_between(poses.front(), poses[segment.first]),
-                      seconds_between(poses.front(), poses[segment.last])};
-  const double length_s = seconds_between(poses[segment.first], poses[segment.last]);
+  const Piece piece =
+      config.on_gap == OnGap::kLongestSegment ? longest_piece(poses, config.largest_gap_s) : Piece{0, poses.size() - 1};
+  const PoseSpan span{seconds_between(poses.front(), poses[piece.first]),
+                      seconds_between(poses.front(), poses[piece.last])};
+  const double length_s = seconds_between(poses[piece.first], poses[piece.last]);
   const double used_s = config.speed_up * duration_s;
   if (config.start_s + used_s > length_s) {
     throw core::DataError(fmt::format(
@@ -200,7 +200,7 @@ SplineFit fit_spline(const std::vector<core::StampedPose>& poses, const Trajecto
   const double margin_s = kOrder * knot_s;
   const double begin_s = -std::min(margin_s, config.start_s);
   const double end_s = std::min(used_s + margin_s, length_s - config.start_s);
-  const std::vector<Sample> samples = samples_in_span(poses, segment, config, begin_s, end_s);
+  const std::vector<Sample> samples = samples_in_span(poses, piece, config, begin_s, end_s);
 
   const int before = static_cast<int>(std::ceil(-begin_s / knot_s));
   const int after = static_cast<int>(std::ceil(end_s / knot_s));

@@ -14,7 +14,56 @@ namespace {
 constexpr std::string_view kStates = "truth/mav0/state_groundtruth_estimate0/data.csv";
 constexpr std::string_view kLandmarks = "truth/landmarks.csv";
 constexpr std::string_view kTracks = "truth/tracks.csv";
+constexpr std::string_view kSegments = "truth/segments.csv";
+constexpr std::string_view kLineTracks = "truth/line_tracks.csv";
+constexpr std::string_view kLineEnds = "truth/line_ends.csv";
 constexpr std::string_view kCalibration = "truth/calibration.yaml";
+
+void write_lines(const std::filesystem::path& folder, const GroundTruth& truth) {
+  std::string segments = "#segment,x0 [m],y0 [m],z0 [m],x1 [m],y1 [m],z1 [m]\n";
+  for (std::size_t i = 0; i < truth.segments_W.size(); ++i) {
+    const auto& [p, q] = truth.segments_W[i].ends_W;
+    segments += fmt::format("{},{},{},{},{},{},{}\n", i, p.x(), p.y(), p.z(), q.x(), q.y(), q.z());
+  }
+  core::write_file_atomically(folder / kSegments, segments);
+  std::string tracks = "#track_id,segment\n";
+  for (const auto& [track, segment] : truth.track_segment) tracks += fmt::format("{},{}\n", track, segment);
+  core::write_file_atomically(folder / kLineTracks, tracks);
+  std::string ends = "#frame_ns,track_id,segment,t_imu0 [s],t_imu1 [s],u0 [px],v0 [px],u1 [px],v1 [px]\n";
+  for (const LineEnds& e : truth.line_ends) {
+    ends += fmt::format("{},{},{},{},{},{},{},{},{}\n", e.frame_ns, e.track_id, e.segment, e.t_imu_s[0], e.t_imu_s[1],
+                        e.ends_px[0].x(), e.ends_px[0].y(), e.ends_px[1].x(), e.ends_px[1].y());
+  }
+  core::write_file_atomically(folder / kLineEnds, ends);
+}
+
+// The index of one of the segments.
+int segment_in(const core::CsvReader& csv, std::size_t column, const std::vector<Segment>& segments_W) {
+  const std::int64_t segment = csv.integer(column);
+  if (segment < 0 || segment >= std::ssize(segments_W)) csv.fail(fmt::format("there is no segment {}", segment));
+  return static_cast<int>(segment);
+}
+
+void read_lines(const std::filesystem::path& folder, GroundTruth& truth) {
+  core::CsvReader segments(folder / kSegments, 7);
+  while (segments.next()) {
+    const auto end = [&](std::size_t column) -> Eigen::Vector3d {
+      return {segments.number(column), segments.number(column + 1), segments.number(column + 2)};
+    };
+    truth.segments_W.push_back({{end(1), end(4)}});
+  }
+  core::CsvReader tracks(folder / kLineTracks, 2);
+  while (tracks.next()) truth.track_segment[tracks.integer(0)] = segment_in(tracks, 1, truth.segments_W);
+  core::CsvReader ends(folder / kLineEnds, 9);
+  while (ends.next()) {
+    truth.line_ends.push_back({.frame_ns = ends.integer(0),
+                               .track_id = ends.integer(1),
+                               .segment = segment_in(ends, 2, truth.segments_W),
+                               .t_imu_s = {ends.number(3), ends.number(4)},
+                               .ends_px = {Eigen::Vector2d(ends.number(5), ends.number(6)),
+                                           Eigen::Vector2d(ends.number(7), ends.number(8))}});
+  }
+}
 
 }  // namespace
 
@@ -45,6 +94,7 @@ void write_truth(const std::filesystem::path& folder, const GroundTruth& truth) 
   std::string tracks = "#track_id,landmark\n";
   for (const auto& [track, landmark] : truth.track_landmark) tracks += fmt::format("{},{}\n", track, landmark);
   core::write_file_atomically(folder / kTracks, tracks);
+  if (!truth.segments_W.empty()) write_lines(folder, truth);
   core::write_file_atomically(folder / kCalibration, core::to_yaml(core::resolved_config(truth.calibration)));
 }
 
@@ -71,6 +121,7 @@ GroundTruth read_truth(const std::filesystem::path& folder) {
   }
   core::CsvReader tracks(folder / kTracks, 2);
   while (tracks.next()) truth.track_landmark[tracks.integer(0)] = static_cast<int>(tracks.integer(1));
+  if (std::filesystem::exists(folder / kSegments)) read_lines(folder, truth);
   return truth;
 }
 

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/physical_ranges.h"
+#include "sim/world_lines.h"
 
 namespace plumbline::sim {
 namespace {
@@ -68,6 +69,7 @@ World make_world(const ScenarioConfig& scenario, const Trajectory& trajectory, c
     refuse_path_through_walls(world.walls, path.body_W);
     refuse_path_through_walls(world.walls, path.camera_W);
   }
+  if (scenario.lines.per_frame > 0) world.segments_W = make_segments(scenario, trajectory, world, id);
   return world;
 }
 

@@ -18,9 +18,9 @@ namespace fs = std::filesystem;
 using namespace plumbline;
 
 // The order that tools/fuzz makes its seeds in.
-constexpr std::array<const char*, 7> kFiles = {
-    "meta.yaml",          "prior.yaml",           "mav0/imu0/data.csv",   "mav0/imu0/sensor.yaml",
-    "mav0/cam0/data.csv", "mav0/cam0/points.csv", "mav0/cam0/sensor.yaml"};
+constexpr std::array<const char*, 8> kFiles = {
+    "meta.yaml",          "prior.yaml",           "mav0/imu0/data.csv",  "mav0/imu0/sensor.yaml",
+    "mav0/cam0/data.csv", "mav0/cam0/points.csv", "mav0/cam0/lines.csv", "mav0/cam0/sensor.yaml"};
 
 class Folder {
  public:
@@ -33,6 +33,8 @@ class Folder {
     scenario.imu.rate_hz = 20.0;
     scenario.imu.noise = {1e-3, 1e-4, 1e-2, 1e-3};
     scenario.points.per_frame = 3;
+    scenario.lines.per_frame = 3;
+    scenario.world.lines.random = 500;
     core::write_dataset(path_ / "dataset", sim::simulate(scenario, {}).measurements, {});
   }
   ~Folder() { fs::remove_all(path_); }

@@ -1,11 +1,15 @@
 // Google Benchmark of the parts that a trial spends its time in: build/<preset>/tools/plumbline_benchmarks
+#include <filesystem>
+
 #include <benchmark/benchmark.h>
 
+#include "core/dataset.h"
 #include "estimator/estimate.h"
 #include "estimator/factors/preintegration.h"
 #include "estimator/keyframes.h"
 #include "eval/cramer_rao.h"
 #include "sim/simulate.h"
+#include "sim/truth_files.h"
 
 namespace plumbline {
 namespace {
@@ -73,6 +77,53 @@ void simulate_with_all_defects(benchmark::State& state) {
   state.counters["points_a_frame"] = static_cast<double>(points) / static_cast<double>(frames);
 }
 BENCHMARK(simulate_with_all_defects)->Unit(benchmark::kMillisecond);
+
+// 100 points and 40 lines a frame in rooms whose walls hide what is behind them, written with its truth.
+sim::ScenarioConfig line_rooms() {
+  sim::ScenarioConfig c = handheld_rs();
+  c.duration_s = 60.0;
+  c.trajectory.type = sim::TrajectoryType::kFigureEight;
+  c.trajectory.loop.radius_m = 5.0;
+  c.trajectory.loop.period_s = 22.0;
+  c.world.type = sim::WorldType::kRooms;
+  c.world.landmarks = 6000;
+  c.world.lines.windows.spacing_m = 2.0;
+  c.world.lines.random = 400;
+  c.lines.per_frame = 40;
+  c.lines.slide_sigma_px = 3.0;
+  c.lines.fragment_probability = 0.01;
+  c.lines.merge_probability = 0.1;
+  c.lines.loss_probability = 0.02;
+  return c;
+}
+
+void simulate_and_write_lines(benchmark::State& state) {
+  const sim::ScenarioConfig config = line_rooms();
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / "plumbline_benchmark_lines";
+  std::filesystem::remove_all(folder);
+  std::uint64_t trial = 0;
+  std::size_t points = 0;
+  std::size_t lines = 0;
+  std::size_t frames = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    const sim::Simulation s = sim::simulate(config, {1, trial++});
+    core::write_dataset(folder, s.measurements, {});
+    sim::write_truth(folder, s.truth);
+    for (const core::Frame& frame : s.measurements.frames) {
+      points += frame.points.size();
+      lines += frame.lines.size();
+    }
+    frames += s.measurements.frames.size();
+    state.PauseTiming();
+    std::filesystem::remove_all(folder);
+    state.ResumeTiming();
+  }
+  state.counters["times_real_time"] =
+      benchmark::Counter(config.duration_s * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["points_a_frame"] = static_cast<double>(points) / static_cast<double>(frames);
+  state.counters["lines_a_frame"] = static_cast<double>(lines) / static_cast<double>(frames);
+}
+BENCHMARK(simulate_and_write_lines)->Unit(benchmark::kMillisecond);
 
 void batch_solve(benchmark::State& state) {
   const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});

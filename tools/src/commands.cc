@@ -105,7 +105,11 @@ int simulate(const SimulateOptions& options) {
   const auto trajectory = sim::make_trajectory(scenario.trajectory, scenario.duration_s, id);
   const sim::MotionStrength m = sim::motion_strength(*trajectory, scenario.duration_s);
   std::size_t observations = 0;
-  for (const core::Frame& frame : simulation.measurements.frames) observations += frame.points.size();
+  std::size_t lines = 0;
+  for (const core::Frame& frame : simulation.measurements.frames) {
+    observations += frame.points.size();
+    lines += frame.lines.size();
+  }
   const std::size_t frames = simulation.measurements.frames.size();
   fmt::print(
       "path {:.2f} m, rms: speed {:.3f} m/s, acceleration {:.3f} m/s^2, rate {:.3f} rad/s (peak {:.3f}), "
@@ -118,10 +122,16 @@ int simulate(const SimulateOptions& options) {
         scenario.trajectory.file.generic_string(), core::kPoseFormatNames[static_cast<std::size_t>(spline->format)],
         spline->from_s, spline->to_s, spline->residuals.position_rms_m, spline->residuals.rotation_rms_rad);
   }
-  fmt::print("{} IMU samples, {} frames, {} points, {:.1f} a frame, {} tracks\ndataset: {}\n",
-             simulation.measurements.imu.size(), frames, observations,
-             frames > 0 ? static_cast<double>(observations) / static_cast<double>(frames) : 0.0,
-             simulation.truth.track_landmark.size(), options.out.generic_string());
+  const auto a_frame = [&](std::size_t n) {
+    return frames > 0 ? static_cast<double>(n) / static_cast<double>(frames) : 0.0;
+  };
+  fmt::print("{} IMU samples, {} frames, {} points, {:.1f} a frame, {} tracks\n", simulation.measurements.imu.size(),
+             frames, observations, a_frame(observations), simulation.truth.track_landmark.size());
+  if (!simulation.truth.segments_W.empty()) {
+    fmt::print("{} lines, {:.1f} a frame, {} tracks of {} segments\n", lines, a_frame(lines),
+               simulation.truth.track_segment.size(), simulation.truth.segments_W.size());
+  }
+  fmt::print("dataset: {}\n", options.out.generic_string());
   if (options.plot) {
     const std::filesystem::path plots = options.out / "plots";
     write_plots(plots, {.scenario = scenario,

@@ -167,21 +167,25 @@ void check_scenario(const sim::ScenarioConfig& scenario, core::TrialId id) {
 
 // Likewise a cell's: noise the estimator cannot work with.
 void check_cell(const Experiment& e) {
-  estimator::require_usable(
-      estimator::believed_noise(e.estimator, e.scenario.imu.noise, e.scenario.camera.pixel_sigma_px),
-      e.scenario.prior.calibration_sigmas(), e.estimator.estimate);
+  const double pixel_sigma_px = e.scenario.camera.pixel_sigma_px;
+  const double line_sigma_px = e.scenario.lines.sigma_px;
+  const bool has_lines = e.scenario.lines.per_frame > 0;
+  estimator::require_usable(e.estimator,
+                            estimator::believed_noise(e.estimator, e.scenario.imu.noise, pixel_sigma_px, line_sigma_px),
+                            e.scenario.prior.calibration_sigmas(), has_lines);
   if (e.metrics.crlb) {
     if (e.metrics.first_n > 0 || e.metrics.first_s > 0.0) {
       throw core::RuleError({"eval.crlb", "is of an alignment by all poses; leave out first_n and first_s"});
     }
     // The bound speaks of the true noise, whatever the estimator believes.
     const core::ImuNoise& imu = e.scenario.imu.noise;
-    const double least = std::min({imu.gyro_noise_density, imu.gyro_bias_walk, imu.accel_noise_density,
-                                   imu.accel_bias_walk, e.scenario.camera.pixel_sigma_px});
+    double least = std::min({imu.gyro_noise_density, imu.gyro_bias_walk, imu.accel_noise_density, imu.accel_bias_walk});
+    if (estimator::uses_points(e.estimator.use)) least = std::min(least, pixel_sigma_px);
+    if (estimator::uses_lines(e.estimator.use) && has_lines) least = std::min(least, line_sigma_px);
     if (!(least >= core::kLeastSigma)) {
       throw core::RuleError(
-          {"eval.crlb", fmt::format("needs noise: scenario.camera.pixel_sigma_px and the four noises of scenario.imu "
-                                    "must be >= {}",
+          {"eval.crlb", fmt::format("needs noise: scenario.camera.pixel_sigma_px, scenario.lines.sigma_px where there "
+                                    "are lines, and the four noises of scenario.imu must be >= {}",
                                     core::kLeastSigma)});
     }
   }

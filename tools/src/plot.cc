@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <span>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,6 +16,7 @@ namespace plumbline::tools {
 namespace {
 
 const Colour kLandmark{205, 185, 165};
+const Colour kSegment{150, 190, 225};
 const Colour kWall{70, 70, 70};
 const Colour kPlane{190, 150, 110};
 const Colour kStart{60, 140, 30};
@@ -73,6 +76,9 @@ void plot_trajectory(const std::string& file, const PlotInput& input) {
   for (std::size_t i = 0; i < input.world.points_W.size(); i += stride) {
     canvas.dot(from_above(input.world.points_W[i]), 1.5, kLandmark);
   }
+  for (const sim::Segment& segment : input.world.segments_W) {
+    canvas.line(from_above(segment.ends_W[0]), from_above(segment.ends_W[1]), kSegment);
+  }
   const bool planes = input.scenario.world.type == sim::WorldType::kPlanes;
   for (const sim::Wall& wall : input.world.walls.walls) {
     planes ? draw_outline(canvas, wall) : draw_upright(canvas, wall);
@@ -88,8 +94,35 @@ void plot_trajectory(const std::string& file, const PlotInput& input) {
   canvas.legend("path, early", along_the_scale(0.0));
   canvas.legend("late", along_the_scale(1.0));
   canvas.legend(stride == 1 ? "landmarks" : fmt::format("landmarks, 1 of {}", stride), kLandmark);
+  if (!input.world.segments_W.empty()) canvas.legend("segments", kSegment);
   if (!input.world.walls.walls.empty()) canvas.legend(planes ? "planes" : "walls", planes ? kPlane : kWall);
   canvas.write(file);
+}
+
+// Dark where a track is old: its observations up to now, of at most so many frames.
+constexpr std::size_t kTailFrames = 12;
+Colour colour_of_age(std::size_t observations) {
+  return along_the_scale(1.0 - static_cast<double>(observations - 1) / kTailFrames);
+}
+
+// The segments of the last frame, and the ways of their middles through the others: ends slide, and say nothing.
+void draw_lines(Canvas& canvas, std::span<const core::Frame> frames) {
+  std::map<std::int64_t, std::vector<Eigen::Vector2d>> tails;
+  for (const core::Frame& frame : frames) {
+    for (const auto& line : frame.lines) tails[line.track_id].push_back(0.5 * (line.ends_px[0] + line.ends_px[1]));
+  }
+  for (const auto& line : frames.back().lines) {
+    const std::vector<Eigen::Vector2d>& tail = tails.at(line.track_id);
+    const Colour colour = colour_of_age(tail.size());
+    for (std::size_t i = 1; i < tail.size(); ++i) canvas.line(tail[i - 1], tail[i], colour, 1);
+    canvas.line(line.ends_px[0], line.ends_px[1], colour, 2);
+    for (const Eigen::Vector2d& end : line.ends_px) canvas.dot(end, 2.5, colour);
+  }
+}
+
+std::string tracks_text(const core::Frame& frame) {
+  if (frame.lines.empty()) return fmt::format("{} tracks,", frame.points.size());
+  return fmt::format("{} points and {} lines,", frame.points.size(), frame.lines.size());
 }
 
 void plot_frame(const std::string& file, const PlotInput& input) {
@@ -98,7 +131,6 @@ void plot_frame(const std::string& file, const PlotInput& input) {
   const Eigen::AlignedBox2d picture(Eigen::Vector2d(-0.5, -0.5),
                                     Eigen::Vector2d(camera.width_px - 0.5, camera.height_px - 0.5));
   const std::size_t now = frames.size() / 2;
-  constexpr std::size_t kTailFrames = 12;
   const std::size_t first = now - std::min(now, kTailFrames);
 
   std::map<std::int64_t, std::vector<Eigen::Vector2d>> tails;
@@ -106,13 +138,14 @@ void plot_frame(const std::string& file, const PlotInput& input) {
     for (const auto& point : frames[i].points) tails[point.track_id].push_back(point.pixel);
   }
   Canvas canvas(picture,
-                fmt::format("{}: frame {} of {}, {} tracks, tails of {} frames", input.title, now + 1, frames.size(),
-                            frames[now].points.size(), now - first),
+                fmt::format("{}: frame {} of {}, {} tails of {} frames", input.title, now + 1, frames.size(),
+                            tracks_text(frames[now]), now - first),
                 Canvas::VerticalAxis::kDown);
   canvas.draw_axes("u [px]", "v [px]");
+  draw_lines(canvas, std::span(frames).subspan(first, now - first + 1));
   for (const auto& point : frames[now].points) {
     const std::vector<Eigen::Vector2d>& tail = tails.at(point.track_id);
-    const Colour colour = along_the_scale(1.0 - static_cast<double>(tail.size() - 1) / kTailFrames);
+    const Colour colour = colour_of_age(tail.size());
     for (std::size_t i = 1; i < tail.size(); ++i) canvas.line(tail[i - 1], tail[i], colour, 1);
     canvas.dot(point.pixel, 4.0, colour);
   }

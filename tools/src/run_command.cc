@@ -98,7 +98,8 @@ ordered_json summarise_results(const Plan& plan, const std::filesystem::path& ou
                      [&](const eval::Row& row) { rows[static_cast<std::size_t>(row.cell)].push_back(row); });
   ordered_json json_cells = ordered_json::array();
   for (std::size_t i = 0; i < plan.cells.size(); ++i) {
-    cells.push_back(eval::summarise(rows[i], plan.cells[i].axes));
+    const bool robust = plan.cells[i].experiment.estimator.loss != estimator::RobustLoss::kNone;
+    cells.push_back(eval::summarise(rows[i], plan.cells[i].axes, robust ? "the estimator has a robust loss" : ""));
     json_cells.push_back(eval::to_json(cells.back()));
   }
   return {{"experiment", plan.base.experiment.name},

@@ -31,19 +31,23 @@ class ThreadClock {
 
 // NEES and bound speak of a prior whose mean was drawn with the covariance that the estimator is given. Exact means
 // leave no room for them at all, and a fixed mean of td none for td's and for what holds td.
-void withhold_claims(const sim::PriorConfig& prior, std::vector<eval::Metric>& metrics) {
+// A robust loss bends the likelihood that a covariance is of; the bound is of the data and stays.
+void withhold_claims(const Experiment& experiment, std::vector<eval::Metric>& metrics) {
+  const sim::PriorConfig& prior = experiment.scenario.prior;
+  const bool robust = experiment.estimator.loss != estimator::RobustLoss::kNone;
   const bool exact = prior.means == sim::PriorMeans::kTruth;
   for (eval::Metric& metric : metrics) {
     const bool of_td = metric.name.starts_with("td_") || metric.name == "calibration" || metric.name == "joint";
-    if (exact || (prior.td_mean_s && of_td)) {
+    const bool no_room = exact || (prior.td_mean_s && of_td);
+    if (robust || no_room) {
       metric.nees.reset();
       metric.nees_dof = 0;
-      metric.crlb.reset();
     }
+    if (no_room) metric.crlb.reset();
   }
 }
 
-// The bound of what the estimator was given: the keyframes' observations.
+// The bound of what the estimator was given: the keyframes' observations of the kinds that it uses.
 void add_bound(const Experiment& experiment, const core::MeasurementLog& measurements, const sim::GroundTruth& truth,
                core::TimeNs start, eval::TrialResult& result) {
   const estimator::EstimateWhat& free = experiment.estimator.estimate;
@@ -53,6 +57,8 @@ void add_bound(const Experiment& experiment, const core::MeasurementLog& measure
        .td = free.td,
        .readout = free.readout,
        .extrinsics = free.extrinsics,
+       .points = estimator::uses_points(experiment.estimator.use),
+       .lines = estimator::uses_lines(experiment.estimator.use),
        .alignment = experiment.metrics.alignment,
        .causal = true});
   eval::add_bounds(bound, result.metrics);
@@ -73,7 +79,7 @@ eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, T
   if (experiment.metrics.crlb && result.ok) {
     add_bound(experiment, measurements, truth, estimate.states.front().t_ns, result);
   }
-  withhold_claims(experiment.scenario.prior, result.metrics);
+  withhold_claims(experiment, result.metrics);
   t.evaluate_s = clock.lap();
   if (timings != nullptr) *timings = t;
   return result;

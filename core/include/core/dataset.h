@@ -3,6 +3,7 @@
 //   prior.yaml                what is known beforehand (mean, sigmas, start)
 //   mav0/imu0/{data.csv, sensor.yaml}
 //   mav0/cam0/{data.csv, points.csv, sensor.yaml}     points: frame_ns, track_id, u, v, and vx, vy where known
+//   mav0/cam0/lines.csv       frame_ns, track_id, u0, v0, u1, v1, and vx0, vy0, vx1, vy1 where known; where lines are
 // Numbers are written in their shortest form that reads back to the bit, stamps as integer nanoseconds.
 #pragma once
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -55,6 +56,13 @@ struct OnlineState {
   StateCovariance covariance = StateCovariance::Zero();  // in the order of core/state.h
 };
 
+// An estimated line through P with unit direction d: (n, d) in the world, n = P x d [m].
+struct LineEstimate {
+  std::int64_t track_id = 0;
+  Eigen::Vector3d moment_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction_W = Eigen::Vector3d::UnitX();
+};
+
 // Whitened residuals of one kind at the solution. Their sum of squares is smaller than their number even where the
 // noise is as stated, since the parameters were fitted to them; only the sum over all kinds has a known number of
 // degrees of freedom, residuals - parameters.
@@ -89,6 +97,8 @@ struct EstimateLog {
   bool extrinsics_estimated = false;
   PosteriorCovariance covariance = PosteriorCovariance::Zero();
   std::vector<TimeOffsetEstimate> td_history;
+  std::vector<LineEstimate> lines;
+  int line_tracks = 0;                     // of lines that two keyframes or more see; estimated or not
   std::vector<OnlineState> state_history;  // empty where the estimator keeps none
   SolveSummary summary;
 };

@@ -1,6 +1,7 @@
 // All that an estimator is given: what a real rig would deliver, and what its user would know beforehand.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -27,9 +28,19 @@ struct PointObservation {
   std::optional<Eigen::Vector2d> velocity = std::nullopt;
 };
 
+// A segment as a detector reports it: its two ends, each exposed with its own row. Neither end need be the same place
+// on the line from frame to frame: pictures end, detectors cut short.
+struct LineObservation {
+  std::int64_t track_id = 0;  // numbered apart from those of points
+  std::array<Eigen::Vector2d, 2> ends_px = {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  // Of each end, in normalised coordinates, 1/s; absent where none is known.
+  std::optional<std::array<Eigen::Vector2d, 2>> velocities = std::nullopt;
+};
+
 struct Frame {
   TimeNs t_cam_ns = 0;  // camera clock
-  std::vector<PointObservation> points;
+  std::vector<PointObservation> points = {};
+  std::vector<LineObservation> lines = {};
 };
 
 // What is known before the first image: itself a measurement, drawn about the truth. The state is that of the IMU
@@ -52,7 +63,8 @@ struct MeasurementLog {
   InitialPrior prior;
   PinholeCamera camera;
   ImuNoise imu_noise;           // as the data sheet states it
-  double pixel_sigma_px = 0.0;  // likewise
+  double pixel_sigma_px = 0.0;  // likewise, u and v of a point
+  double line_sigma_px = 0.0;   // likewise, u and v of each end of a segment
   double gravity_m_s2 = 9.81;   // g_W = (0, 0, -gravity_m_s2)
 };
 

@@ -35,6 +35,20 @@ struct Scene {
   PluckerLine line;
 };
 
+Scene scene_of(const CameraModel& model, const FrameTiming& frame, const Eigen::Vector3d& origin_W,
+               const OrthonormalLine& line, double const* const* parameters) {
+  const core::Pose T_B_C = unpack_pose(parameters[1]);
+  return {.model = model,
+          .frame = frame,
+          .origin_W = origin_W,
+          .state = unpack_state(parameters[0]),
+          .T_B_C = T_B_C,
+          .R_B_C = T_B_C.q.toRotationMatrix(),
+          .td_s = *parameters[2],
+          .readout_s = *parameters[3],
+          .line = line.plucker()};
+}
+
 // The foot of the perpendicular from an observed end point on the curve F = 0, and the body then.
 struct CurveFoot {
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  // foot - observed
@@ -115,16 +129,7 @@ PropagatedLineFactor::PropagatedLineFactor(const CameraModel& model, FrameTiming
 bool PropagatedLineFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
   const OrthonormalLine line(parameters[4]);
   if (line.degenerate()) return false;
-  const core::Pose T_B_C = unpack_pose(parameters[1]);
-  const Scene scene{.model = model_,
-                    .frame = frame_,
-                    .origin_W = origin_W_,
-                    .state = unpack_state(parameters[0]),
-                    .T_B_C = T_B_C,
-                    .R_B_C = T_B_C.q.toRotationMatrix(),
-                    .td_s = *parameters[2],
-                    .readout_s = *parameters[3],
-                    .line = line.plucker()};
+  const Scene scene = scene_of(model_, frame_, origin_W_, line, parameters);
   const LineRows rows(jacobians);
   const bool with_bias = rows.row(0, kStateSize, 0) != nullptr;
   for (int k = 0; k < 2; ++k) {
@@ -137,7 +142,7 @@ bool PropagatedLineFactor::Evaluate(double const* const* parameters, double* res
     const LineGradient gradient(chain, scale * bearing_at(ends_[k], foot.offset_px));
     write_state_row(gradient.body_position(chain), gradient.body_rotation(chain), scene.state, foot.body.local,
                     foot.bias, foot.tau_s, rows.row(0, kStateSize, k));
-    write_pose_row(gradient.extrinsic_position(chain), gradient.extrinsic_rotation(chain), T_B_C.q,
+    write_pose_row(gradient.extrinsic_position(chain), gradient.extrinsic_rotation(chain), scene.T_B_C.q,
                    rows.row(1, kPoseSize, k));
     const double J_td = rate_along(gradient, chain, foot.body);
     write_scalar(J_td, rows.row(2, 1, k));
@@ -145,6 +150,19 @@ bool PropagatedLineFactor::Evaluate(double const* const* parameters, double* res
     write_line_row(line, chain, gradient, rows.row(4, kLineSize, k));
   }
   return true;
+}
+
+std::optional<SegmentPixels> PropagatedLineFactor::feet(double const* const* parameters) const {
+  const OrthonormalLine line(parameters[4]);
+  if (line.degenerate()) return std::nullopt;
+  const Scene scene = scene_of(model_, frame_, origin_W_, line, parameters);
+  SegmentPixels pixels;
+  for (std::size_t k = 0; k < 2; ++k) {
+    CurveFoot foot;
+    if (!find_foot(scene, ends_[k], false, foot)) return std::nullopt;
+    pixels[k] = ends_[k].pixel + foot.offset_px;
+  }
+  return pixels;
 }
 
 }  // namespace plumbline::estimator

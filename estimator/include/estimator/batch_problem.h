@@ -6,39 +6,21 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <ceres/loss_function.h>
 #include <ceres/problem.h>
 
 #include "core/estimate.h"
-#include "core/measurements.h"
-#include "estimator/config.h"
-#include "estimator/factors/local_motion.h"
+#include "estimator/batch_values.h"
 #include "estimator/factors/parameter_blocks.h"
-#include "estimator/keyframes.h"
+#include "estimator/line_terms.h"
 #include "estimator/point_terms.h"
 
 namespace plumbline::estimator {
 
-// What stays the same while the estimate grows.
-struct BatchInput {
-  const core::MeasurementLog& log;
-  const EstimatorConfig& config;
-  BelievedNoise noise;
-  std::vector<std::size_t> keyframes;  // indices of frames
-  std::vector<Track> tracks;
-};
-
-// The values found so far. State 0 is the prior's, state k + 1 that of keyframe k.
-struct BatchValues {
-  core::RigCalibration calibration;
-  std::vector<std::size_t> samples;  // the IMU sample of each state
-  std::vector<core::State> states;
-  std::vector<std::optional<Eigen::Vector3d>> landmarks;  // (x, y, lambda) a track
-};
-
 class BatchProblem {
  public:
-  // Linearises inertial factors and local motions about the biases in `values`. Landmarks whose factors cannot be
-  // evaluated there (behind a camera) are left out and lose their value.
+  // Linearises inertial factors and local motions about the biases in `values`. Points and lines whose factors
+  // cannot be evaluated there (behind a camera) are left out and lose their value.
   BatchProblem(const BatchInput& input, const BatchValues& values);
 
   struct Outcome {
@@ -58,16 +40,23 @@ class BatchProblem {
   // Of calibration and last state, at the present values.
   std::optional<core::PosteriorCovariance> posterior_covariance() const;
 
+  // The tracks of lines that an observed end is further from than so many sigmas, at the present values.
+  std::vector<std::size_t> lines_beyond(double sigmas) const;
+
  private:
+  using Timings = std::vector<FrameTiming>;  // of the keyframes
+
   // Of the residual blocks [first, last) in the order in which they were added, without loss functions.
   core::ResidualSum residual_sum(int first, int last) const;
 
   void add_priors();
   void add_inertial_factors();
-  void add_points();
-  bool add_point(const PointModel& model, const std::vector<FrameTiming>& timings, const Track& track,
-                 Eigen::Vector3d& landmark);
+  Timings frame_timings() const;
+  void add_points(const Timings& timings);
+  bool add_point(const PointModel& model, const Timings& timings, const Track& track, Eigen::Vector3d& landmark);
   double* landmark_block(Eigen::Vector3d& landmark) const;  // what of it is estimated
+  void add_lines(const Timings& timings);
+  bool add_line(const LineModel& model, const Timings& timings, std::size_t track, LineValue& line);
 
   const BatchInput& input_;
   BatchValues start_;
@@ -77,11 +66,20 @@ class BatchProblem {
   double readout_s_;
   std::vector<Eigen::Vector3d> landmarks_;
   std::vector<std::size_t> landmark_tracks_;
+  std::vector<LineValue> lines_;
+  std::vector<std::size_t> line_tracks_;
+  struct LineResidual {
+    std::size_t track;
+    ceres::ResidualBlockId block;
+  };
+  std::vector<LineResidual> line_residuals_;
   int observations_ = 0;
   int inertial_begin_ = 0;  // the residual blocks: priors, then inertial, then visual ones
   int visual_begin_ = 0;
   StateManifold state_manifold_;
   PoseManifold pose_manifold_;
+  OrthonormalLineManifold line_manifold_;
+  std::unique_ptr<ceres::LossFunction> loss_;  // of visual residuals; null: none
   std::unique_ptr<ceres::Problem> problem_;
 };
 

@@ -20,6 +20,14 @@ enum class Initialisation { kPrior };
 inline constexpr std::array<std::string_view, 1> kInitialisationNames = {"prior"};
 enum class LinearSolver { kAutomatic, kSparseSchur, kDenseSchur };
 inline constexpr std::array<std::string_view, 3> kLinearSolverNames = {"automatic", "sparse_schur", "dense_schur"};
+enum class RobustLoss { kNone, kHuber, kCauchy };
+inline constexpr std::array<std::string_view, 3> kRobustLossNames = {"none", "huber", "cauchy"};
+
+// Which observations enter.
+enum class ObservationUse { kPointsAndLines, kPoints, kLines };
+inline constexpr std::array<std::string_view, 3> kObservationUseNames = {"points_and_lines", "points", "lines"};
+inline bool uses_points(ObservationUse use) { return use != ObservationUse::kLines; }
+inline bool uses_lines(ObservationUse use) { return use != ObservationUse::kPoints; }
 
 // The estimator's own belief of the IMU's noise; the data sheet's where absent.
 struct ImuNoiseOverride {
@@ -36,8 +44,15 @@ struct EstimateWhat {
   bool extrinsics = true;
 };
 
+// When a line is estimated at all (estimator/line_triangulation.h) and when it is given up.
+struct LineRules {
+  double largest_depth_sigma = 0.3;
+  double cull_sigma = 8.0;
+};
+
 struct EstimatorConfig {
   EstimatorType type = EstimatorType::kBatch;
+  ObservationUse use = ObservationUse::kPointsAndLines;
   TimingModel timing = TimingModel::kPropagated;
   ResidualType residual = ResidualType::kPinhole;
   LandmarkType landmark = LandmarkType::kBearingInverseDepth;
@@ -45,9 +60,13 @@ struct EstimatorConfig {
   LinearSolver solver = LinearSolver::kAutomatic;
   double keyframe_rate_hz = 10.0;
   std::optional<double> pixel_sigma_px;
+  std::optional<double> line_sigma_px;
+  RobustLoss loss = RobustLoss::kNone;
+  double loss_scale = 2.0;
   std::optional<double> state_td_s;
   ImuNoiseOverride imu;
   EstimateWhat estimate;
+  LineRules lines;
   int max_iterations = 50;
   double max_cost_per_dof = 2.0;
 };
@@ -58,7 +77,9 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c);
 struct BelievedNoise {
   core::ImuNoise imu;
   double pixel_sigma_px = 0.0;
+  double line_sigma_px = 0.0;
 };
-BelievedNoise believed_noise(const EstimatorConfig& config, const core::ImuNoise& imu_noise, double pixel_sigma_px);
+BelievedNoise believed_noise(const EstimatorConfig& config, const core::ImuNoise& imu_noise, double pixel_sigma_px,
+                             double line_sigma_px);
 
 }  // namespace plumbline::estimator

@@ -1,5 +1,5 @@
 // Marginal covariance of a least-squares problem: the leading block of (J^T J)^-1 at the present values, J the
-// whitened Jacobian on the tangent spaces.
+// whitened Jacobian on the tangent spaces, weighted by the loss functions where there are any.
 #pragma once
 
 #include <optional>

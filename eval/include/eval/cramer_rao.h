@@ -2,14 +2,15 @@
 // a smaller covariance than
 //   Sigma = ( P0^-1 + sum_i J_i^T J_i )^-1
 // J_i the whitened Jacobians of all inertial and visual measurements at the true states, with the exact camera timing
-// (`propagated`), landmarks with three degrees of freedom and no prior. Rates and accelerations in them are the
-// true ones (noise_free_imu): with those of the noisy samples a rig at rest would seem to turn, and td to be seen.
-// Since priors are drawn as one more measurement, this is the classical bound (Van Trees, 1968, section 2.4.2); the
-// biases' walk is part of the measurement model.
+// (`propagated`), points with three degrees of freedom, lines with four, without prior. Rates and accelerations in them
+// are the true ones (noise_free_imu): with those of the noisy samples a rig at rest would seem to turn, and td to be
+// seen. Since priors are drawn as one more measurement, this is the classical bound (Van Trees, 1968, section 2.4.2);
+// the biases' walk is part of the measurement model.
 //
 // Landmarks are taken in world coordinates here, which any smooth choice of coordinates equals. Each track is a
 // landmark of its own, as to an estimator that does not recognise places. A direction in which no observation moves
-// a landmark (no parallax) is left out.
+// a landmark (no parallax; a line that is seen from one plane only) is left out. Of a segment's ends only the distance
+// from the line is measured, two rows an observation (estimator/factors/line_factors.h).
 #pragma once
 
 #include <vector>
@@ -37,8 +38,9 @@ struct CramerRaoBound {
   std::vector<PoseCovariance> poses;  // likewise, from all measurements
   AlignedBound ate;
   std::vector<CausalBound> causal;  // one a frame, if asked for
-  // (sigma_g f)^2 |tau| M / sigma_px^2, mean over the observations: the share of the gyroscope's noise within the gap
-  // between a state and its observations, which the model neglects. The bound is trusted up to kLargestKappa2.
+  // (sigma_g f)^2 |tau| M / sigma_px^2, mean over the observations, of points and of lines added: the share of the
+  // gyroscope's noise within the gap between a state and its observations, which the model neglects. The bound is
+  // trusted up to kLargestKappa2.
   double kappa2 = 0.0;
 };
 
@@ -49,6 +51,8 @@ struct BoundOptions {
   bool td = true;                   // what is free
   bool readout = true;
   bool extrinsics = true;
+  bool points = true;  // what is observed
+  bool lines = true;
   Alignment alignment = Alignment::kPosyaw;  // by all poses
   bool causal = false;
 };
@@ -58,7 +62,8 @@ struct BoundOptions {
 // two ends, where there is one neighbour, to first.
 std::vector<core::ImuSample> noise_free_imu(const core::MeasurementLog& log, const sim::GroundTruth& truth);
 
-// Needs positive noise densities and pixel noise. Throws std::domain_error where the information is singular.
+// Needs positive noise densities and pixel noise of what is observed. Throws std::domain_error where the information is
+// singular.
 CramerRaoBound cramer_rao_bound(const core::MeasurementLog& log, const sim::GroundTruth& truth,
                                 const BoundOptions& options);
 

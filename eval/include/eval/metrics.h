@@ -21,6 +21,10 @@
 //   joint                 m, as final_pose                                   calibration and final_state jointly
 //   nis_visual            mean squared whitened residual at the solution     -
 //   nis_inertial          likewise; both are below 1 where the noise is as stated, since parameters were fitted to them
+//   line_angle_deg        rms over the trial's lines of the angle from the true direction (eval/line_error.h)    -
+//   line_distance_m       likewise of the distance of the true segment's ends from the line                      -
+//   line_share            lines that were estimated / tracks of lines in two keyframes or more
+//                         The three only where lines were used, the first two only where one was estimated.
 //   kappa2                of the bound, see eval/cramer_rao.h; only with eval.crlb
 //   td_convergence_s      since the first estimated state: the first instant after which |td error| stays within
 //                         eval.td_bound_s for the rest; only where the estimator keeps a history of td
@@ -55,8 +59,11 @@ struct MetricInfo {
 
 inline constexpr std::string_view kTdConvergence = "td_convergence_s";
 inline constexpr std::string_view kKappa2 = "kappa2";
+inline constexpr std::string_view kLineAngle = "line_angle_deg";
+inline constexpr std::string_view kLineDistance = "line_distance_m";
+inline constexpr std::string_view kLineShare = "line_share";
 
-inline constexpr std::array<MetricInfo, 22> kMetrics = {{
+inline constexpr std::array<MetricInfo, 25> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
@@ -77,6 +84,9 @@ inline constexpr std::array<MetricInfo, 22> kMetrics = {{
     {"joint", "calibration and state", 1e3, false, false},
     {"nis_visual", "visual residuals, squared", 1.0, false, false},
     {"nis_inertial", "inertial residuals, squared", 1.0, false, false},
+    {kLineAngle, "line direction [deg]", 1.0},
+    {kLineDistance, "line distance [mm]", 1e3},
+    {kLineShare, "lines estimated, share", 1.0, false, false},
     {kTdConvergence, "td convergence [s]", 1.0, false, false},
     {kKappa2, "kappa2 of the bound", 1.0, false, false},
 }};

@@ -9,8 +9,9 @@
 //               a single parameter |e| <= 3 sigma; with Clopper and Pearson's interval. 0.9973 is expected.
 //   nis         sum of squared whitened residuals over all trials, a chi-square variable of sum(residuals - parameters)
 //               degrees of freedom where the noise is as the estimator believes; divided by these, with its 95 % band
-// A NEES, NIS or efficiency is claimed only where every trial is ok: those that fail would have been the worst. No NIS
-// where there is no NEES at all, as with exact prior means.
+// A NEES, NIS or efficiency is claimed only where every trial is ok: those that fail would have been the worst; and
+// only of an estimator whose covariance is meant as one, not with a robust loss. No NIS where there is no NEES at all,
+// as with exact prior means.
 #pragma once
 
 #include <optional>
@@ -77,9 +78,11 @@ struct CellSummary {
   std::string note;  // why there is no NEES or efficiency where there might have been
 };
 
-// Throws std::invalid_argument where two ok rows do not hold the same metrics, with and without NEES alike: they are
-// not of one cell.
-CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes);
+// no_claim: the reason why no NEES and no efficiency may be claimed of these trials at all, if there is one.
+// line_angle_deg and line_distance_m are left out where a trial has estimated no line and so has neither.
+// Throws std::invalid_argument where two ok rows do not hold the same other metrics, with and without NEES alike: they
+// are not of one cell.
+CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes, const std::string& no_claim = {});
 
 // {"axes", "n", "n_ok", "metrics": {NAME: {"mean", "rmse", "median", "std", "q05", "q95", "mean_ci95", "rmse_ci95",
 //  "crlb", "efficiency", "efficiency_ci95", "nees_dof", "nees_mean", "nees_band95", "within_3_sigma",

@@ -34,6 +34,14 @@ class FrameView {
   // the fold of its lens) at that time or at the middle row's.
   std::optional<Exposure> expose(const Eigen::Vector3d& P_W) const;
 
+  // The same to first order in the motion during the readout, for a start: a pixel is off by its acceleration times
+  // half the square of its row's delay. Nothing where the middle row's pose does not see the landmark.
+  std::optional<Exposure> glance(const Eigen::Vector3d& P_W) const;
+
+  // In the camera of the middle row, and how far a point at a distance from it may have moved at its own row, [m].
+  Eigen::Vector3d in_middle_row(const Eigen::Vector3d& P_W) const { return T_C_W_middle_ * P_W; }
+  double reach_m(double distance_m) const { return reach_m_ + turn_rad_ * distance_m; }
+
   // False only for a landmark that is certainly outside the picture or the range of depth: a test by the pose of the
   // middle row with the margin that the motion during the readout asks for.
   bool may_see(const Eigen::Vector3d& P_W, double nearest_m, double farthest_m) const;
@@ -42,6 +50,16 @@ class FrameView {
   Eigen::Vector2d image_velocity(const Eigen::Vector3d& P_W, double t_imu_s) const;
 
  private:
+  // The landmark at the middle row's time, and the row that its motion there predicts.
+  struct MiddleRow {
+    Eigen::Vector3d P_C;
+    Eigen::Vector3d P_C_dot;  // 1/s
+    Eigen::Vector2d pixel;
+    Eigen::Vector2d flow;  // px/s
+    double slope = 1.0;    // d(row - shown row)/d row
+    double row = 0.0;
+  };
+  std::optional<MiddleRow> at_middle_row(const Eigen::Vector3d& P_W) const;
   core::Pose camera_pose_at(double t_imu_s) const;
 
   const Trajectory& trajectory_;
@@ -49,6 +67,7 @@ class FrameView {
   core::RigCalibration calibration_;
   double t_middle_s_;
   core::Pose T_C_W_middle_;
+  core::Pose T_W_C_middle_;
   Eigen::Vector3d v_C_;      // of the camera in the world, in camera axes
   Eigen::Vector3d omega_C_;  // of the camera, in camera axes
   double cos_half_angle_;    // of the cone about the optical axis that holds the picture and the margin

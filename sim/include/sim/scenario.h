@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "sim/camera_config.h"
 #include "sim/imu_config.h"
+#include "sim/lines_config.h"
 #include "sim/prior_config.h"
 #include "sim/trajectory_config.h"
 #include "sim/world_config.h"
@@ -23,6 +24,7 @@ struct ScenarioConfig {
   CameraConfig camera;
   WorldConfig world;
   PointsConfig points;
+  LinesConfig lines;
   PriorConfig prior;
 
   // The rig as it truly is, td of the middle row.

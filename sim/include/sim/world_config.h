@@ -1,4 +1,4 @@
-// The keys of scenario.world: the landmarks that there are, and the walls.
+// The keys of scenario.world: the landmarks and segments that there are, and the walls.
 #pragma once
 
 #include <array>
@@ -37,6 +37,24 @@ struct PlanesConfig {
   double side_m = 3.0;
 };
 
+// A row of them along every upright wall.
+struct WindowsConfig {
+  double spacing_m = 0.0;  // 0 is no windows
+  double width_m = 1.0;
+  double height_m = 1.0;
+  double sill_m = 1.0;  // above the floor
+};
+
+struct WorldLinesConfig {
+  bool edges = true;
+  bool doors = true;
+  WindowsConfig windows;
+  double grid_spacing_m = 0.0;  // 0 is no grid
+  int random = 0;
+  double random_shortest_m = 0.5;
+  double random_longest_m = 2.0;
+};
+
 struct WorldConfig {
   WorldType type = WorldType::kShell;
   int landmarks = 4000;
@@ -46,6 +64,10 @@ struct WorldConfig {
   RoomsConfig rooms;
   CorridorConfig corridor;
   PlanesConfig planes;
+  WorldLinesConfig lines;
+
+  // Whether it may hold any segment.
+  bool has_lines() const;
 };
 
 void visit(core::ConfigVisitor& v, WorldConfig& c);

@@ -25,6 +25,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include <ceres/sized_cost_function.h>
 
@@ -72,6 +73,9 @@ class PropagatedLineFactor final : public ceres::SizedCostFunction<2, kStateSize
                        const SegmentPixels& observed);
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+  // The observed ends moved onto the curve. Nothing where Evaluate is false.
+  std::optional<SegmentPixels> feet(double const* const* parameters) const;
 
  private:
   CameraModel model_;
