@@ -40,7 +40,7 @@ struct Case {
   std::string text;
   std::vector<std::string> says;  // parts of the message
   // What of a sound file `text` is written for; all of it where empty.
-  std::string replaces = {};  // NOLINT(readability-redundant-member-init): g++ warns of designated lists without it
+  std::string replaces = {};
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }

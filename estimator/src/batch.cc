@@ -76,12 +76,13 @@ bool cull_lines(const BatchInput& input, const BatchProblem& problem, BatchValue
 std::vector<core::LineEstimate> line_estimates(const BatchInput& input, const BatchValues& values) {
   std::vector<core::LineEstimate> lines;
   for (std::size_t t = 0; t < values.lines.size(); ++t) {
-    if (!values.lines[t]) continue;
-    const PluckerLine L = OrthonormalLine(values.lines[t]->block.data()).plucker();
+    const std::optional<LineValue>& line = values.lines[t];
+    if (!line) continue;
+    const PluckerLine L = OrthonormalLine(line->block.data()).plucker();
     const Eigen::Vector3d d = L.d.normalized();
     // From the line's own origin to the world's.
     lines.push_back({.track_id = input.line_tracks[t].id,
-                     .moment_W = L.n / L.d.norm() + values.lines[t]->origin_W.cross(d),
+                     .moment_W = L.n / L.d.norm() + line->origin_W.cross(d),
                      .direction_W = d});
   }
   return lines;

@@ -94,8 +94,9 @@ void BatchProblem::add_lines(const Timings& timings) {
                         .timing = input_.config.timing};
   lines_.reserve(input_.line_tracks.size());  // parameter blocks must not move
   for (std::size_t t = 0; t < input_.line_tracks.size(); ++t) {
-    if (!start_.lines[t]) continue;
-    LineValue& line = lines_.emplace_back(*start_.lines[t]);
+    const std::optional<LineValue>& start = start_.lines[t];
+    if (!start) continue;
+    LineValue& line = lines_.emplace_back(*start);
     if (add_line(model, timings, t, line)) {
       line_tracks_.push_back(t);
     } else {

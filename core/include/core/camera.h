@@ -18,7 +18,7 @@ struct PinholeCamera {
   double fy_px = 460.0;
   double cx_px = 319.5;
   double cy_px = 239.5;
-  Distortion distortion = {};  // NOLINT(readability-redundant-member-init): g++ warns of designated lists without it
+  Distortion distortion = {};
 
   // Pixel of the point P_C in the camera frame (any positive scale of it will do, since only the direction counts);
   // nothing for a point that is not in front of the camera or beyond the fold of its lens. J, if given, is

@@ -41,7 +41,7 @@ struct TrajectoryErrorOptions {
   core::TimeNs tolerance_ns = kDefaultToleranceNs;
   double min_coverage = 0.9;
   // Of the relative errors.
-  std::vector<Delta> deltas = {};  // NOLINT(readability-redundant-member-init): designated initialisers leave it out
+  std::vector<Delta> deltas = {};
 };
 
 struct TrajectoryErrors {

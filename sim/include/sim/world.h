@@ -16,12 +16,11 @@ namespace plumbline::sim {
 // World coordinates in metres.
 struct World {
   std::vector<Eigen::Vector3d> points_W;  // landmarks; those on a wall lie a few millimetres before it
-  // NOLINTNEXTLINE(readability-redundant-member-init): g++ warns of designated lists without it
-  std::vector<Segment> segments_W = {};  // likewise
+  std::vector<Segment> segments_W = {};   // likewise
   Walls walls;
   // What carries landmarks and segments, seen from where the normals point.
-  std::vector<Wall> faces = {};  // NOLINT(readability-redundant-member-init): likewise
-  bool walls_hide = false;       // else the walls carry landmarks and hide nothing
+  std::vector<Wall> faces = {};
+  bool walls_hide = false;  // else the walls carry landmarks and hide nothing
 
   bool occluded(const Eigen::Vector3d& camera_W, const Eigen::Vector3d& P_W) const {
     return walls_hide && walls.occluded(camera_W, P_W);
