@@ -150,6 +150,7 @@ CellSummary summarise(const std::vector<Row>& rows, nlohmann::ordered_json axes,
   if (rows_ok.empty()) return cell;
   keep_line_errors_of_all(rows_ok);
   std::vector<const Row*> ok;
+  ok.reserve(rows_ok.size());
   for (const Row& row : rows_ok) ok.push_back(&row);
   for (const Row* row : ok) require_same_metrics(*ok.front(), *row);
 

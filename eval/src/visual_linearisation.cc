@@ -226,10 +226,9 @@ class Lineariser {
         const auto segment = truth_.track_segment.find(o.track_id);
         if (segment == truth_.track_segment.end()) continue;
         const auto index = static_cast<std::size_t>(segment->second);
-        const auto line = lines.try_emplace(o.track_id, line_of(truth_.segments_W[index], k)).first;
-        if (!line->second.block) continue;
-        auto seen =
-            view.observe(timings_[k], motion_.states[k + 1], line->second.origin_W, *line->second.block, o.ends_px);
+        const LineAtTruth& line = lines.try_emplace(o.track_id, line_of(truth_.segments_W[index], k)).first->second;
+        if (!line.block) continue;
+        auto seen = view.observe(timings_[k], motion_.states[k + 1], line.origin_W, *line.block, o.ends_px);
         if (!seen) continue;
         tracks.add(k, o.track_id, std::move(seen->observation));
         result_.line_gaps.sum_s += seen->mean_gap_s;
