@@ -13,8 +13,8 @@ namespace plumbline::estimator {
 namespace {
 
 // Depths of the anchor's ends that are plausible.
-constexpr double kNearestM = 0.1;
-constexpr double kFarthestM = 200.0;
+constexpr double kNearestEndM = 0.1;
+constexpr double kFarthestEndM = 200.0;
 
 // An observed end in the world, about the line's origin.
 struct Ray {
@@ -95,7 +95,7 @@ Depths depths_of_anchor(const std::vector<Ray>& rays, const LineStartRules& rule
     const bool is_known = std::sqrt(covariance(k, k)) < rules.largest_depth_sigma * std::abs(rho);
     if (!is_known) return {depths.rho, LineDeferral::kNoParallax};
     if (rho < 0.0) return {depths.rho, LineDeferral::kBehind};
-    if (!(rho > 1.0 / kFarthestM && rho < 1.0 / kNearestM)) return {depths.rho, LineDeferral::kOutOfRange};
+    if (!(rho > 1.0 / kFarthestEndM && rho < 1.0 / kNearestEndM)) return {depths.rho, LineDeferral::kOutOfRange};
   }
   return depths;
 }
