@@ -13,6 +13,7 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "bound_problem.h"
 #include "core/random.h"
 #include "estimator/batch_problem.h"
 #include "estimator/factors/imu_factor.h"
@@ -24,44 +25,17 @@
 namespace plumbline::eval {
 namespace {
 
-sim::ScenarioConfig small_scenario() {
-  sim::ScenarioConfig c;
-  c.duration_s = 2.5;
-  c.trajectory.handheld.rate_rms_rad_s = 0.75;
-  c.imu.noise = {1.7e-4, 2e-5, 2e-3, 3e-3};
-  c.camera.td_s = 0.02;
-  c.camera.readout_s = 0.03;
-  c.points.per_frame = 12;
-  // A prior whose mean is off the truth has a Jacobian that is off the identity by half as much.
-  c.prior.means = sim::PriorMeans::kTruth;
-  return c;
-}
+using plumbline::testing::every_second_frame;
+using plumbline::testing::nearest_sample;
+using plumbline::testing::true_states;
 
-std::vector<std::size_t> every_second_frame(const core::MeasurementLog& log) {
-  std::vector<std::size_t> frames;
-  for (std::size_t i = 0; i < log.frames.size(); i += 2) frames.push_back(i);
-  return frames;
-}
-
-std::size_t nearest_sample(const core::MeasurementLog& log, core::TimeNs t_ns) {
-  std::size_t best = 0;
-  for (std::size_t i = 0; i < log.imu.size(); ++i) {
-    if (std::abs(log.imu[i].t_ns - t_ns) < std::abs(log.imu[best].t_ns - t_ns)) best = i;
-  }
-  return best;
-}
+sim::ScenarioConfig small_scenario() { return plumbline::testing::bound_scenario(12); }
 
 // The truth as values of the batch problem. A landmark is taken in its anchor so that the model, not the trajectory,
 // maps it to the true point: both sides then linearise at the same place to the last digit.
 estimator::BatchValues true_values(const estimator::BatchInput& input, const sim::GroundTruth& truth) {
   const core::MeasurementLog& log = input.log;
-  estimator::BatchValues values;
-  values.calibration = truth.calibration;
-  values.samples.push_back(0);
-  for (const std::size_t k : input.keyframes) {
-    values.samples.push_back(nearest_sample(log, log.frames[k].t_cam_ns + core::to_ns(truth.calibration.td_s)));
-  }
-  for (const std::size_t s : values.samples) values.states.push_back(truth.states[s].state);
+  estimator::BatchValues values = true_states(input, truth);
   const estimator::CameraModel model{log.camera, log.pixel_sigma_px, log.gravity_m_s2};
   for (const estimator::Track& track : input.tracks) {
     const std::size_t k = track.observations.front().keyframe;

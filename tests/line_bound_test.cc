@@ -1,11 +1,10 @@
 // The Cramer-Rao bound of lines against the covariance that the batch estimator's own factors give at the truth.
 #include <cmath>
-#include <cstdlib>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "estimator/batch_problem.h"
+#include "bound_problem.h"
 #include "eval/cramer_rao.h"
 #include "simulated_lines.h"
 
@@ -13,43 +12,13 @@ namespace plumbline::eval {
 namespace {
 
 using estimator::ObservationUse;
+using plumbline::testing::every_second_frame;
+using plumbline::testing::true_states;
 
-sim::ScenarioConfig scenario() {
-  sim::ScenarioConfig c;
-  c.duration_s = 2.5;
-  c.trajectory.handheld.rate_rms_rad_s = 0.75;
-  c.imu.noise = {1.7e-4, 2e-5, 2e-3, 3e-3};
-  c.camera.td_s = 0.02;
-  c.camera.readout_s = 0.03;
-  c.points.per_frame = 10;
-  // A prior whose mean is off the truth has a Jacobian that is off the identity by half as much.
-  c.prior.means = sim::PriorMeans::kTruth;
-  return c;
-}
-
-std::vector<std::size_t> every_second_frame(const core::MeasurementLog& log) {
-  std::vector<std::size_t> frames;
-  for (std::size_t i = 0; i < log.frames.size(); i += 2) frames.push_back(i);
-  return frames;
-}
-
-std::size_t nearest_sample(const core::MeasurementLog& log, core::TimeNs t_ns) {
-  std::size_t best = 0;
-  for (std::size_t i = 0; i < log.imu.size(); ++i) {
-    if (std::abs(log.imu[i].t_ns - t_ns) < std::abs(log.imu[best].t_ns - t_ns)) best = i;
-  }
-  return best;
-}
+sim::ScenarioConfig scenario() { return plumbline::testing::bound_scenario(10); }
 
 estimator::BatchValues true_values(const estimator::BatchInput& input, const sim::GroundTruth& truth) {
-  const core::MeasurementLog& log = input.log;
-  estimator::BatchValues values;
-  values.calibration = truth.calibration;
-  values.samples.push_back(0);
-  for (const std::size_t k : input.keyframes) {
-    values.samples.push_back(nearest_sample(log, log.frames[k].t_cam_ns + core::to_ns(truth.calibration.td_s)));
-  }
-  for (const std::size_t s : values.samples) values.states.push_back(truth.states[s].state);
+  estimator::BatchValues values = true_states(input, truth);
   for (const estimator::LineTrack& track : input.line_tracks) {
     const auto& ends = truth.segments_W[static_cast<std::size_t>(truth.track_segment.at(track.id))].ends_W;
     // Another origin than the bound's: covariances of the rest do not depend on it.

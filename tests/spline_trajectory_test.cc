@@ -18,7 +18,7 @@ namespace {
 std::string refusal(const std::vector<core::StampedPose>& poses, const TrajectoryConfig& config, double duration_s) {
   try {
     fit_spline(poses, config, duration_s);
-  } catch (const core::DataError& error) {
+  } catch (const core::RuleError& error) {
     return error.what();
   }
   return "accepted";
@@ -145,8 +145,8 @@ TEST(Spline, RefusesGaps) {
   config.start_s = 2.0;
   config.largest_gap_s = 0.2;
   EXPECT_THAT(refusal(without(4.0, 4.5), config, 5.0),
-              testing::AllOf(testing::StartsWith("poses.tum: gap of 0.500 s"),
-                             testing::HasSubstr("4.000 s and 4.500 s"), testing::HasSubstr("largest_gap_s")));
+              testing::AllOf(testing::StartsWith("scenario.trajectory.largest_gap_s: poses.tum: gap of 0.500 s"),
+                             testing::HasSubstr("4.000 s and 4.500 s"), testing::HasSubstr("wider than 0.2 s")));
   // Over the beginning or the end of the span, with no pose of the fit on the far side.
   EXPECT_THAT(refusal(without(0.5, 3.0), config, 5.0), testing::HasSubstr("gap of 2.500 s"));
   EXPECT_THAT(refusal(without(6.0, 11.0), config, 5.0), testing::HasSubstr("gap of 5.000 s"));
@@ -203,7 +203,7 @@ TEST(Spline, RecordedRoomHasGaps) {
   config.type = TrajectoryType::kSpline;
   config.file = data_folder() / "trajectories/tum_room1.txt";
   if (!std::filesystem::exists(config.file)) GTEST_SKIP() << config.file << " is absent (PLUMBLINE_DATA)";
-  EXPECT_THROW(make_trajectory(config, 135.0, kId), core::DataError);
+  EXPECT_THROW(make_trajectory(config, 135.0, kId), core::RuleError);
   config.on_gap = OnGap::kLongestSegment;
   const auto report = spline_report(config, 10.0);
   ASSERT_TRUE(report.has_value());

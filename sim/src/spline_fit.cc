@@ -54,17 +54,20 @@ std::vector<Sample> samples_in_span(const std::vector<core::StampedPose>& poses,
     // The gap before this pose counts if any of it lies in the span, even where neither of its poses does.
     const double gap_s = i == piece.first ? 0.0 : seconds_between(poses[i - 1], poses[i]);
     if (gap_s > config.largest_gap_s && t > begin_s && t - gap_s < end_s) {
-      throw core::DataError(fmt::format(
-          "{}: gap of {:.3f} s between the poses at {:.3f} s and {:.3f} s after the first; "
-          "scenario.trajectory.largest_gap_s is {}; another start_s, or on_gap: longest_segment, uses a piece without",
-          config.file.generic_string(), gap_s, since_first_s - gap_s, since_first_s, config.largest_gap_s));
+      throw core::RuleError(
+          {"scenario.trajectory.largest_gap_s",
+           fmt::format(
+               "{}: gap of {:.3f} s between the poses at {:.3f} s and {:.3f} s after the first, wider than {} s; "
+               "another start_s, or on_gap: longest_segment, uses a piece without",
+               config.file.generic_string(), gap_s, since_first_s - gap_s, since_first_s, config.largest_gap_s)});
     }
     if (t >= begin_s && t <= end_s) samples.push_back({t, poses[i].T_W_B});
   }
   if (samples.size() < 2) {
-    throw core::DataError(fmt::format("{}: no poses at scenario.trajectory.start_s = {}; {:.3f} s of poses are there",
-                                      config.file.generic_string(), config.start_s,
-                                      seconds_between(poses[piece.first], poses[piece.last])));
+    throw core::RuleError(
+        {"scenario.trajectory.start_s",
+         fmt::format("{}: no poses at {} s; {:.3f} s of poses are there", config.file.generic_string(), config.start_s,
+                     seconds_between(poses[piece.first], poses[piece.last]))});
   }
   return samples;
 }
@@ -189,10 +192,11 @@ SplineFit fit_spline(const std::vector<core::StampedPose>& poses, const Trajecto
   const double length_s = seconds_between(poses[piece.first], poses[piece.last]);
   const double used_s = config.speed_up * duration_s;
   if (config.start_s + used_s > length_s) {
-    throw core::DataError(fmt::format(
-        "{}: scenario.trajectory.start_s + speed_up * scenario.duration_s = {} s, but the {} spans only {:.3f} s",
-        config.file.generic_string(), config.start_s + used_s,
-        config.on_gap == OnGap::kLongestSegment ? "longest piece without a gap" : "file", length_s));
+    throw core::RuleError(
+        {"scenario.trajectory.start_s",
+         fmt::format("{}: start_s + speed_up * scenario.duration_s = {} s, but the {} spans only {:.3f} s",
+                     config.file.generic_string(), config.start_s + used_s,
+                     config.on_gap == OnGap::kLongestSegment ? "longest piece without a gap" : "file", length_s)});
   }
 
   // A few knots beyond the span where the file has them: the ends of a spline are its least certain part.

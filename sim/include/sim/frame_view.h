@@ -53,7 +53,7 @@ class FrameView {
   // The landmark at the middle row's time, and the row that its motion there predicts.
   struct MiddleRow {
     Eigen::Vector3d P_C;
-    Eigen::Vector3d P_C_dot;  // 1/s
+    Eigen::Vector3d P_C_dot;  // m/s
     Eigen::Vector2d pixel;
     Eigen::Vector2d flow;  // px/s
     double slope = 1.0;    // d(row - shown row)/d row

@@ -25,7 +25,7 @@ struct SplineFit {
 
 // The orientation's fit repeats the linear one on the tangent space, with the basis values as its Jacobian, until the
 // update vanishes; that is exact to second order in the rotation between neighbouring knots.
-// Throws core::DataError where the file is too short, or has a gap wider than largest_gap_s that config.on_gap does not
+// Throws core::RuleError where the file is too short, or has a gap wider than largest_gap_s that config.on_gap does not
 // step around.
 SplineFit fit_spline(const std::vector<core::StampedPose>& poses, const TrajectoryConfig& config, double duration_s);
 

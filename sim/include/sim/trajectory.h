@@ -31,7 +31,7 @@ class Trajectory {
   virtual core::Pose pose_at(double t_s) const { return at(t_s).T_W_B; }
 };
 
-// Throws core::DataError where a pose file cannot be used.
+// Throws core::DataError where a pose file cannot be read, core::RuleError where it does not hold what is asked of it.
 std::unique_ptr<const Trajectory> make_trajectory(const TrajectoryConfig& config, double duration_s, core::TrialId id);
 
 // How far the poses of a spline's file lie from it, over the span of the recording.
