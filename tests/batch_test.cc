@@ -9,68 +9,25 @@
 #include "estimator/estimate.h"
 #include "estimator/keyframes.h"
 #include "estimator/triangulation.h"
+#include "short_recording.h"
 #include "sim/simulate.h"
 
 namespace plumbline {
 namespace {
 
-const core::ImuNoise kEurocLike{1.7e-4, 2e-5, 2e-3, 3e-3};
+using testing::believing;
+using testing::Errors;
+using testing::errors_of;
+using testing::kEurocLike;
 
-// A short recording, so that a test takes a fraction of a second.
-sim::ScenarioConfig scenario() {
-  sim::ScenarioConfig c;
-  c.duration_s = 5.0;
-  c.trajectory.handheld.rate_rms_rad_s = 0.75;
-  c.camera.td_s = 0.02;
-  c.camera.readout_s = 0.03;
-  c.imu.noise = kEurocLike;
-  c.world.landmarks = 2000;
-  c.points.per_frame = 40;
-  c.prior.td_sigma_s = 0.02;
-  return c;
-}
-
-sim::ScenarioConfig noise_free_scenario(double imu_rate_hz) {
-  sim::ScenarioConfig c = scenario();
-  c.imu.rate_hz = imu_rate_hz;
-  c.imu.noise = {};
-  c.camera.pixel_sigma_px = 0.0;
-  c.prior.means = sim::PriorMeans::kTruth;
-  c.prior.start = sim::PriorStart::kDrawn;
-  return c;
-}
-
-estimator::EstimatorConfig believing(const core::ImuNoise& noise, double pixel_sigma_px) {
-  estimator::EstimatorConfig c;
-  c.imu = {noise.gyro_noise_density, noise.gyro_bias_walk, noise.accel_noise_density, noise.accel_bias_walk};
-  c.pixel_sigma_px = pixel_sigma_px;
-  return c;
-}
-
-struct Errors {
-  double td_s;
-  double readout_s;
-  double extrinsic_m;
-  double position_rms_m;
-};
-
-Errors errors_of(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
-  double sum = 0.0;
-  for (const core::StampedState& s : estimate.states) {
-    sum += (s.state.T_W_B.p - sim::state_at(truth, s.t_ns).T_W_B.p).squaredNorm();
-  }
-  return {estimate.calibration.td_s - truth.calibration.td_s,
-          estimate.calibration.readout_s - truth.calibration.readout_s,
-          (estimate.calibration.T_B_C.p - truth.calibration.T_B_C.p).norm(),
-          std::sqrt(sum / static_cast<double>(estimate.states.size()))};
-}
+sim::ScenarioConfig scenario() { return testing::short_scenario(40); }
 
 // Without noise all that is left is the midpoint rule: second order, so a quarter from each rate to the next.
 TEST(Batch, NoiseFreeErrorIsTheIntegratorsAndFallsWithItsOrder) {
   const estimator::EstimatorConfig config = believing(kEurocLike, 1.0);
   Errors last{};
   for (const double rate : {200.0, 400.0, 800.0}) {
-    const auto s = sim::simulate(noise_free_scenario(rate), {1, 0});
+    const auto s = sim::simulate(testing::noise_free(scenario(), rate), {1, 0});
     const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
     ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
     const Errors e = errors_of(estimate, s.truth);
@@ -310,7 +267,7 @@ TEST(Batch, AStartThatCannotBeEvaluatedIsAStatus) {
 }
 
 TEST(Batch, RefusesNoiseAndPriorsWithoutWidth) {
-  const auto noise_free = sim::simulate(noise_free_scenario(200.0), {1, 0});
+  const auto noise_free = sim::simulate(testing::noise_free(scenario(), 200.0), {1, 0});
   EXPECT_THROW(estimator::estimate(noise_free.measurements, {}), core::ConfigError);
   sim::ScenarioConfig c = scenario();
   c.prior.td_sigma_s = 0.0;

@@ -8,38 +8,17 @@
 #include "core/error.h"
 #include "estimator/estimate.h"
 #include "estimator/keyframes.h"
+#include "short_recording.h"
 #include "simulated_lines.h"
 
 namespace plumbline {
 namespace {
 
 using estimator::ObservationUse;
+using testing::errors_of;
 using testing::SimulatedLines;
 
-const core::ImuNoise kEurocLike{1.7e-4, 2e-5, 2e-3, 3e-3};
-
-sim::ScenarioConfig scenario() {
-  sim::ScenarioConfig c;
-  c.duration_s = 5.0;
-  c.trajectory.handheld.rate_rms_rad_s = 0.75;
-  c.camera.td_s = 0.02;
-  c.camera.readout_s = 0.03;
-  c.imu.noise = kEurocLike;
-  c.world.landmarks = 2000;
-  c.points.per_frame = 20;
-  c.prior.td_sigma_s = 0.02;
-  return c;
-}
-
-sim::ScenarioConfig noise_free_scenario(double imu_rate_hz) {
-  sim::ScenarioConfig c = scenario();
-  c.imu.rate_hz = imu_rate_hz;
-  c.imu.noise = {};
-  c.camera.pixel_sigma_px = 0.0;
-  c.prior.means = sim::PriorMeans::kTruth;
-  c.prior.start = sim::PriorStart::kDrawn;
-  return c;
-}
+sim::ScenarioConfig scenario() { return testing::short_scenario(20); }
 
 estimator::EstimatorConfig config_for(ObservationUse use) {
   estimator::EstimatorConfig c;
@@ -48,24 +27,9 @@ estimator::EstimatorConfig config_for(ObservationUse use) {
 }
 
 estimator::EstimatorConfig believing_euroc(ObservationUse use) {
-  estimator::EstimatorConfig c = config_for(use);
-  c.imu = {kEurocLike.gyro_noise_density, kEurocLike.gyro_bias_walk, kEurocLike.accel_noise_density,
-           kEurocLike.accel_bias_walk};
-  c.pixel_sigma_px = 1.0;
-  c.line_sigma_px = 1.0;
+  estimator::EstimatorConfig c = testing::believing(testing::kEurocLike, 1.0);
+  c.use = use;
   return c;
-}
-
-double position_rms_m(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
-  double sum = 0.0;
-  for (const core::StampedState& s : estimate.states) {
-    sum += (s.state.T_W_B.p - sim::state_at(truth, s.t_ns).T_W_B.p).squaredNorm();
-  }
-  return std::sqrt(sum / static_cast<double>(estimate.states.size()));
-}
-
-double td_error_s(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
-  return estimate.calibration.td_s - truth.calibration.td_s;
 }
 
 double sigma(const core::EstimateLog& estimate, int i) { return std::sqrt(estimate.covariance(i, i)); }
@@ -75,12 +39,12 @@ TEST(LineBatch, NoiseFreeErrorIsTheIntegratorsAndFallsWithItsOrder) {
   double last_td_s = 0.0;
   double last_position_m = 0.0;
   for (const double rate : {200.0, 400.0, 800.0}) {
-    const auto s = testing::simulate_with_lines(noise_free_scenario(rate), {1, 0}, {.sigma_px = 0.0});
+    const auto s = testing::simulate_with_lines(testing::noise_free(scenario(), rate), {1, 0}, {.sigma_px = 0.0});
     const core::EstimateLog estimate = estimator::estimate(s.measurements, believing_euroc(ObservationUse::kLines));
     ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
     EXPECT_GT(estimate.lines.size(), 20U);
-    const double td_s = td_error_s(estimate, s.truth);
-    const double position_m = position_rms_m(estimate, s.truth);
+    const double td_s = errors_of(estimate, s.truth).td_s;
+    const double position_m = errors_of(estimate, s.truth).position_rms_m;
     if (rate == 200.0) {
       EXPECT_LT(std::abs(td_s), 1e-6);
       EXPECT_LT(position_m, 1e-3);
@@ -101,7 +65,7 @@ TEST(LineBatch, EachUseRecoversTdReadoutAndExtrinsics) {
     estimate = estimator::estimate(s.measurements, config_for(static_cast<ObservationUse>(use)));
     ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << use << ": " << estimate.reason;
     // 4.5 sigma: 7 in a million a quantity.
-    EXPECT_LT(std::abs(td_error_s(estimate, s.truth)), 4.5 * sigma(estimate, core::kCovTd)) << use;
+    EXPECT_LT(std::abs(errors_of(estimate, s.truth).td_s), 4.5 * sigma(estimate, core::kCovTd)) << use;
     EXPECT_LT(std::abs(estimate.calibration.readout_s - s.truth.calibration.readout_s),
               4.5 * sigma(estimate, core::kCovReadout))
         << use;
@@ -150,7 +114,7 @@ TEST(LineBatch, FeatureVelocityFindsTd) {
     config.max_cost_per_dof = 10.0;
     const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
     ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
-    EXPECT_LT(std::abs(td_error_s(estimate, s.truth)), 1.5e-3) << readout_s;
+    EXPECT_LT(std::abs(errors_of(estimate, s.truth).td_s), 1.5e-3) << readout_s;
   }
 }
 
@@ -205,7 +169,7 @@ TEST(LineBatch, ShiftingTheCameraClockShiftsTdOnly) {
 
 // Lines of the estimate are in the world, through the true segments.
 TEST(LineBatch, LinesAreThoseOfTheWorld) {
-  const auto s = testing::simulate_with_lines(noise_free_scenario(400.0), {1, 0}, {.sigma_px = 0.0});
+  const auto s = testing::simulate_with_lines(testing::noise_free(scenario(), 400.0), {1, 0}, {.sigma_px = 0.0});
   const core::EstimateLog estimate = estimator::estimate(s.measurements, believing_euroc(ObservationUse::kLines));
   ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
   EXPECT_GT(static_cast<double>(estimate.lines.size()), 0.6 * estimate.line_tracks);
@@ -239,7 +203,7 @@ TEST(LineBatch, WrongMatchesAreCulled) {
   config.loss = estimator::RobustLoss::kCauchy;
   const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
   ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
-  EXPECT_LT(std::abs(td_error_s(estimate, s.truth)), 4.5 * sigma(estimate, core::kCovTd));
+  EXPECT_LT(std::abs(errors_of(estimate, s.truth).td_s), 4.5 * sigma(estimate, core::kCovTd));
   EXPECT_LT(static_cast<int>(estimate.lines.size()), estimate.line_tracks);
   // What is left has no residual beyond the limit; kept, they would have had hundreds of sigmas.
   config.lines.cull_sigma = 1e6;

@@ -168,8 +168,7 @@ void draw_edges(const std::vector<Wall>& upright_faces, std::vector<Segment>& se
 
 void scatter_lines_on(const std::vector<Wall>& faces, const WorldLinesConfig& config, const core::RandomStream& stream,
                       std::vector<Segment>& segments_W) {
-  std::vector<double> area_up_to = {0.0};
-  for (const Wall& face : faces) area_up_to.push_back(area_up_to.back() + face.size_m.prod());
+  const FacesByArea by_area(faces);
   // Those that meet a door, or have hardly any length within the face, are drawn again.
   constexpr std::uint64_t kMostDraws = 10000;
   for (int i = 0; i < config.random; ++i) {
@@ -182,8 +181,7 @@ void scatter_lines_on(const std::vector<Wall>& faces, const WorldLinesConfig& co
       const auto index = static_cast<std::uint64_t>(i);
       const auto place = stream.uniforms(index, 2 * draw_number);
       const auto shape = stream.uniforms(index, 2 * draw_number + 1);
-      const auto above = std::upper_bound(area_up_to.begin() + 1, area_up_to.end() - 1, place[0] * area_up_to.back());
-      const Wall& face = faces[static_cast<std::size_t>(above - area_up_to.begin()) - 1];
+      const Wall& face = by_area.at(place[0]);
       const Eigen::Vector2d middle(place[1] * face.size_m.x(), place[2] * face.size_m.y());
       const double length_m =
           config.random_shortest_m + shape[0] * (config.random_longest_m - config.random_shortest_m);

@@ -6,11 +6,18 @@
 
 namespace plumbline::sim {
 
+FacesByArea::FacesByArea(const std::vector<Wall>& faces) : faces_(faces), area_up_to_({0.0}) {
+  for (const Wall& face : faces) area_up_to_.push_back(area_up_to_.back() + face.size_m.prod());
+}
+
+const Wall& FacesByArea::at(double u) const {
+  const auto above = std::upper_bound(area_up_to_.begin() + 1, area_up_to_.end() - 1, u * area_up_to_.back());
+  return faces_[static_cast<std::size_t>(above - area_up_to_.begin()) - 1];
+}
+
 std::vector<Eigen::Vector3d> scatter_on(const std::vector<Wall>& faces, int landmarks,
                                         const core::RandomStream& stream) {
-  std::vector<double> area_up_to = {0.0};
-  for (const Wall& face : faces) area_up_to.push_back(area_up_to.back() + face.size_m.prod());
-
+  const FacesByArea by_area(faces);
   // Places in a door are drawn again.
   constexpr std::uint64_t kMostDraws = 10000;
   std::vector<Eigen::Vector3d> points_W;
@@ -22,8 +29,7 @@ std::vector<Eigen::Vector3d> scatter_on(const std::vector<Wall>& faces, int land
                                "must be smaller, or the doors: the walls have hardly any area for landmarks"});
       }
       const auto u = stream.uniforms(static_cast<std::uint64_t>(i), draw);
-      const auto above = std::upper_bound(area_up_to.begin() + 1, area_up_to.end() - 1, u[0] * area_up_to.back());
-      const Wall& face = faces[static_cast<std::size_t>(above - area_up_to.begin()) - 1];
+      const Wall& face = by_area.at(u[0]);
       const Eigen::Vector2d ab(u[1] * face.size_m.x(), u[2] * face.size_m.y());
       if (!face.solid(ab)) continue;
       points_W.emplace_back(face.at(ab) + kBeforeWallM * face.normal_W());
