@@ -34,29 +34,27 @@ bool false_minimum(const BatchInput& input, const core::SolveSummary& summary) {
   return summary.cost_per_dof() > input.config.max_cost_per_dof;
 }
 
-// Solves the recording loosely in stages, each twice as long as the one before.
+// A start for the first `keyframes` keyframes. Its landmarks are not kept: triangulated anew with better poses and more
+// views, they leave a wrong minimum behind, and a line that is not determined does not run off.
+void search(const BatchInput& input, std::size_t keyframes, BatchValues& values, double& timing_td_s) {
+  place_states(input, keyframes, timing_td_s, values);
+  triangulate_missing(input, values);
+  BatchProblem problem(input, values, SolvePhase::kSearch);
+  problem.solve();
+  values = problem.values();
+  values.forget_landmarks();
+  if (must_retime(input, values.calibration.td_s, timing_td_s)) timing_td_s = values.calibration.td_s;
+}
+
+// Searches in stages, each twice as long as the one before.
 void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
   const core::TimeNs first_ns = input.log.frames[input.keyframes.front()].t_cam_ns;
-  const auto keyframes_until = [&](double end_s) {
-    return static_cast<std::size_t>(std::count_if(
+  std::size_t count = 0;
+  for (double end_s = kFirstStageS; count < input.keyframes.size(); end_s *= 2.0) {
+    count = static_cast<std::size_t>(std::count_if(
         input.keyframes.begin(), input.keyframes.end(),
         [&](std::size_t frame) { return core::to_seconds(input.log.frames[frame].t_cam_ns - first_ns) <= end_s; }));
-  };
-  for (double end_s = kFirstStageS;; end_s *= 2.0) {
-    const std::size_t count = keyframes_until(end_s);
-    place_states(input, count, timing_td_s, values);
-    triangulate_missing(input, values);
-
-    BatchProblem problem(input, values);
-    const BatchProblem::SolveOptions loose{.max_iterations = 20, .function_tolerance = 0.05};
-    const BatchProblem::Outcome outcome = problem.solve(loose);
-    values = problem.values();
-    // Landmarks that were triangulated from poor poses may have caught the solver; the poses are better now.
-    if (false_minimum(input, outcome.summary)) values.forget_landmarks();
-    // Whether a line is determined is asked anew with better poses and more views: one that is not would run off.
-    values.forget_lines();
-    if (must_retime(input, values.calibration.td_s, timing_td_s)) timing_td_s = values.calibration.td_s;
-    if (count == input.keyframes.size()) return;
+    search(input, count, values, timing_td_s);
   }
 }
 
@@ -117,9 +115,7 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
     place_states(input, input.keyframes.size(), timing_td_s, values);
     triangulate_missing(input, values);
     BatchProblem problem(input, values);
-    BatchProblem::SolveOptions options{.max_iterations = config.max_iterations};
-    if (restarted) options.initial_trust_region_radius = 1e4;
-    const BatchProblem::Outcome outcome = problem.solve(options);
+    const BatchProblem::Outcome outcome = problem.solve();
     const BatchValues solved = problem.values();
     iterations += outcome.summary.iterations;
     result.status = outcome.status;
@@ -127,10 +123,10 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
 
     const bool bad = outcome.status != core::SolveStatus::kConverged || false_minimum(input, outcome.summary);
     if (bad && !restarted) {
-      // Once more with all landmarks triangulated anew and strong damping.
       restarted = true;
       values = solved;
       values.forget_landmarks();
+      search(input, input.keyframes.size(), values, timing_td_s);
       continue;
     }
     if (outcome.status == core::SolveStatus::kConverged && round + 1 < kMaxRounds) {

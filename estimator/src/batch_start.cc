@@ -42,10 +42,8 @@ std::vector<SegmentView> views_of_line(const BatchInput& input, const BatchValue
 
 void BatchValues::forget_landmarks() {
   std::fill(landmarks.begin(), landmarks.end(), std::nullopt);
-  forget_lines();
+  std::fill(lines.begin(), lines.end(), std::nullopt);
 }
-
-void BatchValues::forget_lines() { std::fill(lines.begin(), lines.end(), std::nullopt); }
 
 std::size_t nearest_sample(const std::vector<core::ImuSample>& imu, double t_s, core::TimeNs origin_ns) {
   const auto time = [&](const core::ImuSample& s) { return core::to_seconds(s.t_ns - origin_ns); };

@@ -17,23 +17,28 @@
 
 namespace plumbline::estimator {
 
+// How the problem is solved.
+enum class SolvePhase {
+  // From a poor start, loosely. A wrong landmark must not pull the poses along: visual residuals have a Cauchy loss,
+  // and after each step of all parameters the landmarks are brought to their own best for the poses (variable
+  // projection: Ruhe and Wedin 1980, algorithm 3), so that a step is judged by the poses it leads to. Otherwise
+  // landmarks that a step sends behind a camera or past infinity shorten all steps, lines more than points.
+  kSearch,
+  // To the minimum of what estimator.loss asks for.
+  kRefine,
+};
+
 class BatchProblem {
  public:
   // Linearises inertial factors and local motions about the biases in `values`. Points and lines whose factors
   // cannot be evaluated there (behind a camera) are left out and lose their value.
-  BatchProblem(const BatchInput& input, const BatchValues& values);
+  BatchProblem(const BatchInput& input, const BatchValues& values, SolvePhase phase = SolvePhase::kRefine);
 
   struct Outcome {
     core::SolveStatus status = core::SolveStatus::kDiverged;
     core::SolveSummary summary;
   };
-  struct SolveOptions {
-    int max_iterations = 50;
-    double function_tolerance = 1e-9;  // relative
-    // Practically Gauss-Newton while it works (the start is close); Ceres damps by itself where a step fails.
-    double initial_trust_region_radius = 1e12;
-  };
-  Outcome solve(const SolveOptions& options);
+  Outcome solve();
 
   BatchValues values() const;
 
@@ -59,6 +64,7 @@ class BatchProblem {
   bool add_line(const LineModel& model, const Timings& timings, std::size_t track, LineValue& line);
 
   const BatchInput& input_;
+  SolvePhase phase_;
   BatchValues start_;
   std::vector<StateBlock> states_;
   PoseBlock extrinsics_;

@@ -42,7 +42,6 @@ struct BatchValues {
   std::vector<bool> culled_lines = {};                    // line tracks that have been given up
 
   void forget_landmarks();
-  void forget_lines();
 };
 
 }  // namespace plumbline::estimator
