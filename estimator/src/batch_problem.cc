@@ -115,7 +115,7 @@ BatchProblem::Outcome BatchProblem::solve() {
   ceres_options.linear_solver_ordering = ordering;
   ceres_options.num_threads = 1;
   const bool search = phase_ == SolvePhase::kSearch;
-  ceres_options.use_inner_iterations = search && landmarks->NumElements() > 0;
+  ceres_options.use_inner_iterations = landmarks->NumElements() > 0 && (search || !lines_.empty());
   ceres_options.inner_iteration_ordering = landmarks;
   ceres_options.max_num_iterations = search ? 20 : input_.config.max_iterations;
   ceres_options.max_solver_time_in_seconds = 1e9;  // never: a result must not depend on the machine's load

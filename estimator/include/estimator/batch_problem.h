@@ -17,15 +17,13 @@
 
 namespace plumbline::estimator {
 
-// How the problem is solved.
+// How the problem is solved. While there are lines, and in a search always, each step of all parameters is followed by
+// the landmarks' own best values for its poses (variable projection: Ruhe and Wedin 1980, algorithm 3), so that a step
+// is judged by where it leads the poses. Otherwise landmarks that it sends behind a camera or past infinity, lines more
+// than points, shorten every step.
 enum class SolvePhase {
-  // From a poor start, loosely. A wrong landmark must not pull the poses along: visual residuals have a Cauchy loss,
-  // and after each step of all parameters the landmarks are brought to their own best for the poses (variable
-  // projection: Ruhe and Wedin 1980, algorithm 3), so that a step is judged by the poses it leads to. Otherwise
-  // landmarks that a step sends behind a camera or past infinity shorten all steps, lines more than points.
-  kSearch,
-  // To the minimum of what estimator.loss asks for.
-  kRefine,
+  kSearch,  // loosely, from a poor start; visual residuals have a Cauchy loss, lest a wrong landmark pull the poses along
+  kRefine,  // to the minimum of what estimator.loss asks for
 };
 
 class BatchProblem {
