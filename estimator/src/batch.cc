@@ -51,9 +51,10 @@ void grow(const BatchInput& input, BatchValues& values, double& timing_td_s) {
   const core::TimeNs first_ns = input.log.frames[input.keyframes.front()].t_cam_ns;
   std::size_t count = 0;
   for (double end_s = kFirstStageS; count < input.keyframes.size(); end_s *= 2.0) {
-    count = static_cast<std::size_t>(std::count_if(
-        input.keyframes.begin(), input.keyframes.end(),
-        [&](std::size_t frame) { return core::to_seconds(input.log.frames[frame].t_cam_ns - first_ns) <= end_s; }));
+    count =
+        static_cast<std::size_t>(std::count_if(input.keyframes.begin(), input.keyframes.end(), [&](std::size_t frame) {
+          return core::to_seconds(input.log.frames[frame].t_cam_ns - first_ns) <= end_s;
+        }));
     search(input, count, values, timing_td_s);
   }
 }

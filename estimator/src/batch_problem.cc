@@ -30,6 +30,10 @@ std::unique_ptr<ceres::LossFunction> make_loss(RobustLoss loss, double scale) {
 // The search's: wide enough for honest noise, and past it an error of a hundred sigmas counts for little more than one
 // of ten.
 constexpr double kSearchLossScale = 3.0;
+constexpr int kSearchIterations = 30;
+// Relative. Ceres also stops at a step that makes things worse by less, and past a loss that grows as slowly as this
+// one a bad step is a small share of the cost.
+constexpr double kSearchTolerance = 1e-3;
 
 }  // namespace
 
@@ -117,9 +121,9 @@ BatchProblem::Outcome BatchProblem::solve() {
   const bool search = phase_ == SolvePhase::kSearch;
   ceres_options.use_inner_iterations = landmarks->NumElements() > 0 && (search || !lines_.empty());
   ceres_options.inner_iteration_ordering = landmarks;
-  ceres_options.max_num_iterations = search ? 20 : input_.config.max_iterations;
+  ceres_options.max_num_iterations = search ? kSearchIterations : input_.config.max_iterations;
   ceres_options.max_solver_time_in_seconds = 1e9;  // never: a result must not depend on the machine's load
-  ceres_options.function_tolerance = search ? 0.05 : 1e-9;
+  ceres_options.function_tolerance = search ? kSearchTolerance : 1e-9;
   ceres_options.gradient_tolerance = 1e-14;
   ceres_options.parameter_tolerance = 1e-12;
   // Practically Gauss-Newton while it works (the start is close); Ceres damps by itself where a step fails.

@@ -22,7 +22,8 @@ namespace plumbline::estimator {
 // is judged by where it leads the poses. Otherwise landmarks that it sends behind a camera or past infinity, lines more
 // than points, shorten every step.
 enum class SolvePhase {
-  kSearch,  // loosely, from a poor start; visual residuals have a Cauchy loss, lest a wrong landmark pull the poses along
+  kSearch,  // loosely, from a poor start; visual residuals have a Cauchy loss, lest a wrong landmark pull the poses
+            // along
   kRefine,  // to the minimum of what estimator.loss asks for
 };
 
