@@ -137,6 +137,13 @@ TEST_F(CommandLine, RunGivesTheCramerRaoBound) {
   const auto with_fixed = nlohmann::json::parse(fixed.out)["cells"][0]["metrics"];
   EXPECT_FALSE(with_fixed["td_error_s"].contains("crlb"));
   EXPECT_TRUE(with_fixed["readout_error_s"].contains("crlb"));
+  const Result global = plumbline(bound + "--out global --set scenario.prior.readout_mean_s=0.02");
+  ASSERT_EQ(global.code, 0) << global.err;
+  const auto with_global = nlohmann::json::parse(global.out)["cells"][0]["metrics"];
+  EXPECT_TRUE(with_global["td_error_s"].contains("crlb"));
+  for (const char* name : {"readout_error_s", "td_first_row_error_s", "calibration"}) {
+    EXPECT_FALSE(with_global[name].contains("crlb")) << name;
+  }
 
   const Result noiseless = plumbline(bound +
                                      "--out none --set scenario.camera.pixel_sigma_px=0 --set "

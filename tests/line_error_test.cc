@@ -61,11 +61,11 @@ const Metric* find(const std::vector<Metric>& metrics, std::string_view name) {
   return at == metrics.end() ? nullptr : &*at;
 }
 
-TEST(LineErrors, AreRootMeanSquaresOverTheLinesWithATruth) {
+TEST(LineErrors, AreMediansOverTheLinesWithATruth) {
   const Trial t = trial();
   const LineErrors e = line_errors(t.estimate, t.truth);
   EXPECT_EQ(e.lines, 2);
-  EXPECT_NEAR(e.distance_m, 0.2 * std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(e.distance_m, 0.1, 1e-12);
   EXPECT_NEAR(e.angle_deg, 0.0, 1e-12);
   EXPECT_DOUBLE_EQ(e.share, 0.75);
 }
@@ -75,7 +75,7 @@ TEST(LineErrors, AreMetricsWhereLinesWereUsed) {
   const TrialResult with = evaluate(t.estimate, t.truth, {});
   ASSERT_TRUE(with.ok) << with.reason;
   ASSERT_NE(find(with.metrics, kLineDistance), nullptr);
-  EXPECT_NEAR(find(with.metrics, kLineDistance)->value, 0.2 * std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(find(with.metrics, kLineDistance)->value, 0.1, 1e-12);
   EXPECT_DOUBLE_EQ(find(with.metrics, kLineShare)->value, 0.75);
 
   t.estimate.lines.clear();
@@ -89,7 +89,7 @@ TEST(LineErrors, AreMetricsWhereLinesWereUsed) {
   EXPECT_EQ(without.metrics.size() + 3, with.metrics.size());
 }
 
-// One trial without any line leaves no rms over all; the share tells of it.
+// One trial without any line leaves none over all; the share tells of it.
 TEST(LineErrors, AreSummarisedWhereEachTrialHasThem) {
   Trial t = trial();
   Row row;

@@ -151,5 +151,18 @@ TEST(Prior, FixedTimeOffsetLeavesTheOtherDraws) {
   EXPECT_EQ(fixed.calibration.T_B_C.q.coeffs(), drawn.calibration.T_B_C.q.coeffs());
 }
 
+TEST(Prior, FixedReadoutLeavesTheOtherDraws) {
+  const GroundTruth truth = some_truth();
+  ScenarioConfig config = some_config();
+  const core::InitialPrior drawn = make_prior(truth, config, {.seed = 1, .trial = 3});
+  config.prior.readout_mean_s = 0.0;
+  const core::InitialPrior fixed = make_prior(truth, config, {.seed = 1, .trial = 3});
+  EXPECT_NE(drawn.calibration.readout_s, 0.0);
+  EXPECT_EQ(fixed.calibration.readout_s, 0.0);
+  EXPECT_EQ(fixed.start_calibration.readout_s, 0.0);
+  EXPECT_EQ(fixed.calibration.td_s, drawn.calibration.td_s);
+  EXPECT_EQ(fixed.calibration.T_B_C.p, drawn.calibration.T_B_C.p);
+}
+
 }  // namespace
 }  // namespace plumbline::sim

@@ -1,10 +1,12 @@
 #include "eval/line_error.h"
 
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Geometry>
 
 #include "core/lie.h"
+#include "eval/statistics.h"
 
 namespace plumbline::eval {
 
@@ -20,19 +22,19 @@ LineError line_error(const core::LineEstimate& line, const sim::Segment& truth) 
 
 LineErrors line_errors(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
   LineErrors errors;
-  double angles = 0.0;
-  double distances = 0.0;
+  std::vector<double> angles_deg;
+  std::vector<double> distances_m;
   for (const core::LineEstimate& line : estimate.lines) {
     const auto segment = truth.track_segment.find(line.track_id);
     if (segment == truth.track_segment.end()) continue;  // a false track has no truth
     const LineError e = line_error(line, truth.segments_W[static_cast<std::size_t>(segment->second)]);
-    angles += e.angle_deg * e.angle_deg;
-    distances += e.distance_m * e.distance_m;
-    ++errors.lines;
+    angles_deg.push_back(e.angle_deg);
+    distances_m.push_back(e.distance_m);
   }
+  errors.lines = static_cast<int>(angles_deg.size());
   if (errors.lines > 0) {
-    errors.angle_deg = std::sqrt(angles / errors.lines);
-    errors.distance_m = std::sqrt(distances / errors.lines);
+    errors.angle_deg = median(angles_deg);
+    errors.distance_m = median(distances_m);
   }
   if (estimate.line_tracks > 0) {
     errors.share = static_cast<double>(estimate.lines.size()) / static_cast<double>(estimate.line_tracks);

@@ -40,6 +40,7 @@ core::InitialPrior make_prior(const GroundTruth& truth, const ScenarioConfig& co
                   ? exact
                   : draw(truth, prior.sigma, prior.calibration_sigma, core::RandomStream(id, "prior/mean"));
   if (p.td_mean_s) mean.calibration.td_s = *p.td_mean_s;
+  if (p.readout_mean_s) mean.calibration.readout_s = *p.readout_mean_s;
   Draw start = mean;
   if (p.start == PriorStart::kDrawn) {
     start = draw(truth, prior.sigma, prior.calibration_sigma, core::RandomStream(id, "prior/start"));

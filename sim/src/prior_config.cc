@@ -13,6 +13,8 @@ void visit(core::ConfigVisitor& v, PriorConfig& c) {
   v.choice("start", c.start, kPriorStartNames, "where the iteration starts: at the means, or at a draw of its own");
   v.value("td_mean_s", c.td_mean_s, core::between(-1.0, 1.0), "drawn",
           "td of the middle row; with a fixed value no NEES of td is reported");
+  v.value("readout_mean_s", c.readout_mean_s, core::between(0.0, 1.0), "drawn",
+          "likewise of the readout; 0, and held, takes the shutter for a global one");
   v.value("td_sigma_s", c.td_sigma_s, up_to(core::kMostTimeOffsetSigmaS), "of the time offset");
   v.value("readout_sigma_s", c.readout_sigma_s, up_to(core::kMostTimeOffsetSigmaS), "of the readout");
   v.value("extrinsic_position_sigma_m", c.extrinsic_position_sigma_m, up_to(core::kMostM), "of p_B_C, each axis");

@@ -30,15 +30,17 @@ class ThreadClock {
 };
 
 // NEES and bound speak of a prior whose mean was drawn with the covariance that the estimator is given. Exact means
-// leave no room for them at all, and a fixed mean of td none for td's and for what holds td.
+// leave no room for them at all, and a fixed mean of td or readout none for its own and for what holds it.
 // A robust loss bends the likelihood that a covariance is of; the bound is of the data and stays.
 void withhold_claims(const Experiment& experiment, std::vector<eval::Metric>& metrics) {
   const sim::PriorConfig& prior = experiment.scenario.prior;
   const bool robust = experiment.estimator.loss != estimator::RobustLoss::kNone;
   const bool exact = prior.means == sim::PriorMeans::kTruth;
   for (eval::Metric& metric : metrics) {
-    const bool of_td = metric.name.starts_with("td_") || metric.name == "calibration" || metric.name == "joint";
-    const bool no_room = exact || (prior.td_mean_s && of_td);
+    const bool of_both = metric.name == "calibration" || metric.name == "joint";
+    const bool of_td = of_both || metric.name.starts_with("td_");
+    const bool of_readout = of_both || metric.name.starts_with("readout_") || metric.name == "td_first_row_error_s";
+    const bool no_room = exact || (prior.td_mean_s && of_td) || (prior.readout_mean_s && of_readout);
     if (robust || no_room) {
       metric.nees.reset();
       metric.nees_dof = 0;

@@ -19,7 +19,8 @@ struct LineError {
 
 LineError line_error(const core::LineEstimate& line, const sim::Segment& truth);
 
-// Root mean squares over the lines of a trial.
+// Medians over the lines of a trial. A track that was seen in passing leaves its line next to no direction, and a mean
+// square would speak of those alone.
 struct LineErrors {
   int lines = 0;  // estimated ones whose segment is known; where there is none, the errors are 0
   double angle_deg = 0.0;

@@ -21,7 +21,7 @@
 //   joint                 m, as final_pose                                   calibration and final_state jointly
 //   nis_visual            mean squared whitened residual at the solution     -
 //   nis_inertial          likewise; both are below 1 where the noise is as stated, since parameters were fitted to them
-//   line_angle_deg        rms over the trial's lines of the angle from the true direction (eval/line_error.h)    -
+//   line_angle_deg        median over the trial's lines of the angle from the true direction (eval/line_error.h)    -
 //   line_distance_m       likewise of the distance of the true segment's ends from the line                      -
 //   line_share            lines that were estimated / tracks of lines in two keyframes or more
 //                         The three only where lines were used, the first two only where one was estimated.

@@ -18,7 +18,8 @@ inline constexpr std::array<std::string_view, 2> kPriorStartNames = {"mean", "dr
 struct PriorConfig {
   PriorMeans means = PriorMeans::kDrawn;
   PriorStart start = PriorStart::kMean;
-  std::optional<double> td_mean_s;  // middle row; drawn where absent
+  std::optional<double> td_mean_s;       // middle row; drawn where absent
+  std::optional<double> readout_mean_s;  // likewise
   double td_sigma_s = 0.01;
   double readout_sigma_s = 0.005;
   double extrinsic_position_sigma_m = 0.02;
