@@ -25,10 +25,22 @@ struct RunOptions {
   std::optional<int> trials;
   int jobs = 0;  // 0: one a processor
   std::vector<std::string> set;
-  bool fresh = false;  // discard results of another configuration
+  std::vector<std::string> only;  // KEY=VALUE of an axis: these cells alone
+  bool fresh = false;             // discard results of another configuration
   bool json = false;
 };
 int run(const RunOptions& options);
+
+struct PlanOptions {
+  std::filesystem::path experiment;
+  std::optional<std::filesystem::path> out;  // out/<experiment.name>
+  std::optional<int> trials;
+  std::vector<std::string> set;
+  std::vector<std::string> only;
+  bool dry_run = false;  // writes nothing; runs a trial or two and says how long all will take
+  int jobs = 0;          // of that estimate; 0: one a processor
+};
+int plan(const PlanOptions& options);
 
 struct SimulateOptions {
   std::filesystem::path scenario;
