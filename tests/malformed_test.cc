@@ -309,6 +309,7 @@ std::vector<Case> experiments() {
        sound + "experiment: {axes: {scenario.camera.td_s: [0, 0.02]}}\n",
        {"--only scenario.camera.td=0: ", "td_s"}},
       {"PlanOutIsBelowAFile", "plan x.yaml --out poses.tum/a", "x.yaml", sound, {"poses.tum is not a folder"}},
+      command("ExportOfNothing", "export-results nowhere --format csv --out out", {"nowhere/manifest.json"}),
       experiment("SetUnknownKey", sound + "set: {scenario.camera.readout: 0}\n", {":2:", "scenario.camera.readout"}),
       experiment("SetNotAMap", sound + "set: 3\n", {":2:", "set"}),
       experiment("Boolean", sound + "estimator: {estimate: {td: maybe}}\n",

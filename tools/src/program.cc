@@ -117,6 +117,14 @@ int parse_and_run(int argc, const char* const* argv) {
       ->capture_default_str();
   compare_command->add_flag("--json", compare_options.json, "print JSON");
 
+  ExportResultsOptions export_options;
+  CLI::App* export_command = app.add_subcommand("export-results", "write the results of a run as one file");
+  export_command->add_option("OUT_DIR", export_options.results, "folder of the results")->required();
+  export_command->add_option("--format", export_options.format, "csv or sqlite")
+      ->required()
+      ->transform(CLI::CheckedTransformer(words<ResultsFormat>(kResultsFormatNames)));
+  export_command->add_option("--out", export_options.out, "the file, which is replaced")->required();
+
   ReplayOptions replay_options;
   CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a finished experiment again");
   replay_command->add_option("OUT_DIR", replay_options.results, "folder of the results")->required();
@@ -173,6 +181,7 @@ int parse_and_run(int argc, const char* const* argv) {
   if (*estimate_command) return estimate(estimate_options);
   if (*evaluate_command) return evaluate(evaluate_options);
   if (*compare_command) return compare(compare_options);
+  if (*export_command) return export_results(export_options);
   if (*replay_command) return replay(replay_options);
   if (*ba_command) return ba(ba_options);
   if (*simulate_ba_command) return simulate_ba(simulate_ba_options);

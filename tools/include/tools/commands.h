@@ -3,10 +3,12 @@
 // Bad input is thrown as core::InputError before anything is written; program() turns it into code 2.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "eval/alignment.h"
@@ -79,6 +81,16 @@ struct CompareOptions {
   bool json = false;
 };
 int compare(const CompareOptions& options);  // kExitWorse where B is significantly worse
+
+enum class ResultsFormat { kCsv, kSqlite };
+inline constexpr std::array<std::string_view, 2> kResultsFormatNames = {"csv", "sqlite"};
+
+struct ExportResultsOptions {
+  std::filesystem::path results;  // the folder of a run
+  ResultsFormat format = ResultsFormat::kCsv;
+  std::filesystem::path out;  // a file, which is replaced
+};
+int export_results(const ExportResultsOptions& options);
 
 struct ReplayOptions {
   std::filesystem::path results;  // the folder of a run
