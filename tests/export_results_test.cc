@@ -236,9 +236,10 @@ TEST_F(ExportResults, BadInputIsNamed) {
   EXPECT_THAT(refusal("out --format xls --out rows"), HasSubstr("xls"));
   write("out/results.jsonl", eval::to_line(ok_) + "\n" + eval::to_line(ok_) + "\n");
   EXPECT_THAT(refusal("out --format sqlite --out rows"), HasSubstr("run 0123456789abcdef is there twice"));
-  ok_.cell = 2;
-  write("out/results.jsonl", eval::to_line(ok_) + "\n");
-  EXPECT_THAT(refusal("out --format sqlite --out rows"), HasSubstr("run 0123456789abcdef: no cell 2"));
+  write("out/manifest.json", R"({"cells": [{"axes": {}, "config_hash": 3, "config": {}}]})");
+  EXPECT_THAT(refusal("out --format csv --out rows"), HasSubstr("out/manifest.json: cells: each needs axes"));
+  write("out/manifest.json", R"({"cells": [{"axes": {}, "config_hash": "abc", "config": {}}]})");
+  EXPECT_THAT(refusal("out --format sqlite --out rows"), HasSubstr("run 0123456789abcdef: no cell 1"));
 }
 
 TEST_F(ExportResults, ThePageHasEveryColumn) {

@@ -17,11 +17,9 @@ std::vector<nlohmann::ordered_json> read_cells(const std::filesystem::path& fold
     throw core::DataError(where + ": is no manifest with cells");
   }
   for (const auto& cell : manifest["cells"]) {
-    for (const char* key : {"axes", "config_hash", "config"}) {
-      if (!cell.is_object() || !cell.contains(key)) {
-        throw core::DataError(fmt::format("{}: cells: {}: missing", where, key));
-      }
-    }
+    const bool is_sound = cell.is_object() && cell.contains("config") && cell.contains("axes") &&
+                          cell["axes"].is_object() && cell.contains("config_hash") && cell["config_hash"].is_string();
+    if (!is_sound) throw core::DataError(where + ": cells: each needs axes (a map), config_hash (text) and config");
   }
   return manifest["cells"];
 }
