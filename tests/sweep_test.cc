@@ -133,6 +133,15 @@ TEST_F(SweepTest, ACellIsTheSameHoweverItWasWrittenDown) {
   }
 }
 
+// A manifest is read with the limits of a configuration file.
+TEST_F(SweepTest, TheManifestOfTheLargestSweepIsReadAgain) {
+  const Plan largest = plan("  axes: {scenario.camera.td_s: {linspace: [0.01, 0.1, 1000]}}\n");
+  const Plan again = read_manifest(write("manifest.json", to_manifest(largest).dump(2)));
+  ASSERT_EQ(again.cells.size(), 1000U);
+  EXPECT_EQ(again.config_hash, largest.config_hash);
+  EXPECT_EQ(run_id(again.cells[777], 3), run_id(largest.cells[777], 3));
+}
+
 // A cell that the filters leave out is not checked, which may be why it is left out.
 TEST_F(SweepTest, WhatIsLeftOutMayBeImpossible) {
   const std::string axis = "  axes: {scenario.camera.pixel_sigma_px: [1, -1]}\n";
@@ -166,7 +175,9 @@ TEST_F(SweepTest, MistakesAreNamedAtTheirPlace) {
   EXPECT_THAT(refusal("  axs: {}\n"), HasSubstr("x.yaml:3: experiment.axs: unknown key; did you mean 'axes'?"));
   EXPECT_THAT(refusal("  axes:\n    scenario.camera.td_s: {linspace: [0, 1, 1000]}\n"
                       "    scenario.camera.readout_s: {linspace: [0, 1, 1000]}\n"),
-              HasSubstr("x.yaml:4: experiment.axes: more than 100000 cells"));
+              HasSubstr("x.yaml:4: experiment.axes: more than 100000 cells before filters"));
+  EXPECT_THAT(refusal("  axes: {scenario.camera.td_s: {linspace: [0, 0.1, 1001]}}\n"),
+              HasSubstr("x.yaml:3: experiment.axes: 1001 cells; at most 1000"));
   EXPECT_THAT(refusal("  trials: 10000000\n  axes: {scenario.camera.td_s: {linspace: [0, 0.1, 300]}}\n"),
               HasSubstr("x.yaml:3: experiment.trials: must be <= 7158278 for 300 cells"));
 

@@ -44,9 +44,9 @@ std::vector<ConfigTree> range_values(const ConfigTree& tree, const std::string& 
   if (numbers.size() != 3 || (logarithmic && !range.linspace.empty())) {
     throw core::config_error(tree.origin, key, "a range is {linspace: [a, b, n]} or {logspace: [a, b, n]}");
   }
-  if (!(numbers[2] >= 2.0 && numbers[2] <= kMaxCells && numbers[2] == std::floor(numbers[2]))) {
+  if (!(numbers[2] >= 2.0 && numbers[2] <= kMaxProduct && numbers[2] == std::floor(numbers[2]))) {
     throw core::config_error(tree.origin, key,
-                             fmt::format("n must be a whole number from 2 to {}, got {}", kMaxCells, numbers[2]));
+                             fmt::format("n must be a whole number from 2 to {}, got {}", kMaxProduct, numbers[2]));
   }
   const int last = static_cast<int>(numbers[2]) - 1;
   std::vector<ConfigTree> values;
@@ -236,8 +236,9 @@ std::vector<std::vector<const ConfigTree*>> cells_of(const Sweep& sweep) {
   std::size_t all = 1;
   for (std::size_t i = 0; i < leaders.size(); ++i) {
     if (leaders[i] == i) all *= sweep.axes[i].values.size();
-    if (all > kMaxCells) {
-      throw core::config_error(sweep.origin, "experiment.axes", fmt::format("more than {} cells", kMaxCells));
+    if (all > kMaxProduct) {
+      throw core::config_error(sweep.origin, "experiment.axes",
+                               fmt::format("more than {} cells before filters", kMaxProduct));
     }
   }
   std::vector<std::vector<const ConfigTree*>> cells;
@@ -256,6 +257,10 @@ std::vector<std::vector<const ConfigTree*>> cells_of(const Sweep& sweep) {
     if (!holds(sweep.skip) && std::ranges::all_of(sweep.only, holds)) cells.push_back(std::move(cell));
   }
   if (cells.empty()) throw core::config_error(sweep.origin, "experiment.axes", "the filters leave no cell");
+  if (cells.size() > kMaxCells) {
+    throw core::config_error(sweep.origin, "experiment.axes",
+                             fmt::format("{} cells; at most {}", cells.size(), kMaxCells));
+  }
   return cells;
 }
 

@@ -29,7 +29,8 @@
 namespace plumbline::tools {
 
 inline constexpr std::array<std::string_view, 4> kSweepKeys = {"axes", "zip", "skip", "only"};
-inline constexpr std::size_t kMaxCells = 100'000;  // of the product
+inline constexpr std::size_t kMaxProduct = 100'000;  // cells before filters
+inline constexpr std::size_t kMaxCells = 1'000;      // after them; a manifest holds each whole and must be read again
 
 struct Axis {
   std::string key;
