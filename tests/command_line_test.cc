@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -274,6 +275,51 @@ TEST_F(CommandLine, SetOnAnAxisReplacesIt) {
   const auto summary = nlohmann::json::parse(result.out);
   ASSERT_EQ(summary["cells"].size(), 1U);
   EXPECT_TRUE(summary["cells"][0]["axes"].empty());
+}
+
+TEST_F(CommandLine, OnlyRunsThoseCellsWithTheirOwnIdentity) {
+  const auto run_ids = [&](const std::string& out) {
+    std::vector<std::string> ids;
+    std::ifstream results(folder_ / out / "results.jsonl");
+    for (std::string line; std::getline(results, line);) ids.push_back(nlohmann::json::parse(line)["run_id"]);
+    return ids;
+  };
+  ASSERT_EQ(plumbline("run small.yaml --trials 1 --out all").code, 0);
+  ASSERT_EQ(plumbline("run small.yaml --trials 1 --out one --only scenario.camera.td_s=0.02").code, 0);
+  EXPECT_EQ(run_ids("one"), std::vector<std::string>{run_ids("all").at(1)});
+}
+
+TEST_F(CommandLine, PlanWritesTheManifestOfTheRunAndNeverAnother) {
+  ASSERT_EQ(plumbline("run small.yaml --trials 1 --out ran").code, 0);
+  const Result result = plumbline("plan small.yaml --trials 1 --out planned");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(result.out, "small: 2 cells x 1 trials = 2 runs\nmanifest: planned/manifest.json\n");
+  EXPECT_EQ(listing(folder_ / "planned"), std::vector<std::string>{"manifest.json"});
+  EXPECT_EQ(read(folder_ / "planned/manifest.json"), read(folder_ / "ran/manifest.json"));
+  EXPECT_EQ(plumbline("plan small.yaml --trials 1 --out planned").code, 0);
+  const Result other = plumbline("plan small.yaml --trials 2 --out planned");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_THAT(other.err, HasSubstr("planned/manifest.json: is of another plan"));
+}
+
+TEST_F(CommandLine, DryRunOfAPlanWritesNothing) {
+  const std::vector<std::string> before = listing(folder_);
+  const Result result = plumbline("plan small.yaml --dry-run --jobs 2");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("small: 2 cells x 3 trials = 6 runs\n"));
+  EXPECT_THAT(result.out, HasSubstr("probe: cell {\"scenario.camera.td_s\":0}, "));
+  EXPECT_THAT(result.out, HasSubstr("probe: cell {\"scenario.camera.td_s\":0.02}, "));
+  EXPECT_THAT(result.out, HasSubstr("estimate from 2 trials: "));
+  // Half the CPU time, to the three digits of each.
+  double cpu_s = 0.0;
+  double wall_s = 0.0;
+  const std::string estimate = result.out.substr(result.out.find("estimate"));
+  ASSERT_EQ(std::sscanf(estimate.c_str(), "estimate from 2 trials: %lf s of CPU, %lf s with 2", &cpu_s, &wall_s), 2);
+  EXPECT_GT(cpu_s, 0.0);
+  EXPECT_NEAR(wall_s, 0.5 * cpu_s, 0.01 * cpu_s);
+  EXPECT_THAT(plumbline("plan small.yaml --dry-run --only scenario.camera.td_s=0").out,
+              HasSubstr("estimate from 1 trial: "));
+  EXPECT_EQ(listing(folder_), before);
 }
 
 TEST_F(CommandLine, FailedTrialsAreCountedAndDecideTheExitCode) {

@@ -64,6 +64,24 @@ void require_no_file_above(const fs::path& path) {
   }
 }
 
+void replace_file_atomically(const fs::path& path, const std::function<void(const fs::path& temporary)>& write) {
+  std::error_code none;
+  const fs::file_status status = fs::status(path, none);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    throw DataError(fmt::format("{}: exists and is not a file", path.generic_string()));
+  }
+  require_no_file_above(path);
+  const fs::path temporary = fmt::format("{}.tmp-{}", path.string(), ::getpid());
+  fs::remove(temporary, none);  // of an earlier process of the same number
+  try {
+    write(temporary);
+    publish_file(temporary, path);
+  } catch (...) {
+    fs::remove(temporary, none);
+    throw;
+  }
+}
+
 void write_file_atomically(const fs::path& path, std::string_view text) {
   std::error_code none;
   const fs::file_status status = fs::status(path, none);

@@ -260,8 +260,8 @@ ConfigTree load_config_file(const std::filesystem::path& file) {
   return tree;
 }
 
-ConfigOverride parse_override(std::string_view assignment) {
-  const Origin origin{std::make_shared<const std::string>(fmt::format("--set {}", assignment)), 0};
+ConfigOverride parse_override(std::string_view assignment, std::string_view option) {
+  const Origin origin{std::make_shared<const std::string>(fmt::format("{} {}", option, assignment)), 0};
   const std::size_t equals = assignment.find('=');
   if (equals == std::string_view::npos) throw config_error(origin, "", "expects key=value");
   const std::string_view key = assignment.substr(0, equals);
@@ -269,7 +269,7 @@ ConfigOverride parse_override(std::string_view assignment) {
     if (part.empty()) throw config_error(origin, "", "expects a key, words joined by dots, before the '='");
   }
   if (assignment.find('\n') != std::string_view::npos) {
-    throw ConfigError(fmt::format("--set {}: the value must be one line", key));
+    throw ConfigError(fmt::format("{} {}: the value must be one line", option, key));
   }
   return {std::string(key), parse(assignment.substr(equals + 1), origin)};
 }
@@ -312,7 +312,8 @@ ConfigError config_error(const Origin& origin, std::string_view dotted_key, std:
     where = *origin.label;
     if (origin.line > 0) where += fmt::format(":{}", origin.line);
     where += ": ";
-    key_is_named = key_is_named || (origin.line == 0 && where.starts_with(fmt::format("--set {}=", dotted_key)));
+    const std::string_view assignment = std::string_view(where).substr(where.find(' ') + 1);  // after the option
+    key_is_named = key_is_named || (origin.line == 0 && assignment.starts_with(fmt::format("{}=", dotted_key)));
   }
   return ConfigError(key_is_named ? fmt::format("{}{}", where, rule)
                                   : fmt::format("{}{}: {}", where, dotted_key, rule));

@@ -20,6 +20,7 @@
 #include "sim/trajectory.h"
 #include "sim/truth_files.h"
 #include "tools/experiment.h"
+#include "tools/export_results.h"
 #include "tools/plot.h"
 #include "tools/run_trial.h"
 #include "tools/version.h"
@@ -158,6 +159,19 @@ int estimate(const EstimateOptions& options) {
              1e3 * estimate.calibration.readout_s,
              1e3 * std::sqrt(estimate.covariance(core::kCovReadout, core::kCovReadout)), options.out.generic_string());
   return estimate.status == core::SolveStatus::kConverged ? kExitOk : kExitWorse;
+}
+
+int export_results(const ExportResultsOptions& options) {
+  switch (options.format) {
+    case ResultsFormat::kCsv:
+      export_csv(options.results, options.out);
+      break;
+    case ResultsFormat::kSqlite:
+      export_sqlite(options.results, options.out);
+      break;
+  }
+  fmt::print("{}\n", options.out.generic_string());
+  return kExitOk;
 }
 
 int replay(const ReplayOptions& options) {

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "axes.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/physical_ranges.h"
@@ -38,7 +41,7 @@ void visit(core::ConfigVisitor& v, ExperimentConfig& c) {
 }
 
 void visit(core::ConfigVisitor& v, Experiment& c) {
-  v.section("experiment", c.experiment, "trials and seed; `axes` (a map from full keys to lists) spans the cells");
+  v.section("experiment", c.experiment, "trials and seed; also `axes`, `zip`, `skip` and `only`: configs/README.md");
   v.section("scenario", c.scenario, "what is simulated");
   v.section("estimator", c.estimator, "how it is estimated");
   v.section("eval", c.metrics, "how it is scored");
@@ -49,11 +52,6 @@ namespace {
 using core::ConfigEntry;
 using core::ConfigTree;
 using nlohmann::ordered_json;
-
-struct Axis {
-  std::string key;
-  std::vector<ConfigTree> values;
-};
 
 ConfigTree* find_entry(ConfigTree& map, std::string_view key) {
   const auto entry = std::find_if(map.entries.begin(), map.entries.end(), [&](const auto& e) { return e.key == key; });
@@ -91,23 +89,23 @@ void include_files(ConfigTree& root) {
   }
 }
 
-std::vector<Axis> take_axes(ConfigTree& root) {
-  std::vector<Axis> axes;
+// Takes what read_sweep() reads.
+Sweep take_sweep(ConfigTree& root) {
   ConfigTree* experiment = find_entry(root, "experiment");
-  if (experiment == nullptr || experiment->kind != ConfigTree::Kind::kMap) return axes;
-  const ConfigTree map = take_entry(*experiment, "axes");
-  require_map(map, "experiment.axes");
-  for (const ConfigEntry& entry : map.entries) {
-    const std::string key = "experiment.axes." + entry.key;
-    if (!(entry.key.starts_with("scenario.") || entry.key.starts_with("estimator."))) {
-      throw core::config_error(entry.origin, key, "an axis is a full key such as scenario.camera.td_s");
+  if (experiment == nullptr || experiment->kind != ConfigTree::Kind::kMap) return {};
+  Sweep sweep = read_sweep(*experiment);
+  std::erase_if(experiment->entries,
+                [](const ConfigEntry& e) { return std::ranges::find(kSweepKeys, e.key) != kSweepKeys.end(); });
+  // The reader of the other keys does not know these.
+  const std::vector<core::KeyDoc> others = core::document_config(ExperimentConfig{}, "");
+  for (const ConfigEntry& e : experiment->entries) {
+    const std::string nearest = core::nearest(e.key, kSweepKeys);
+    if (!nearest.empty() && std::ranges::find(others, e.key, &core::KeyDoc::key) == others.end()) {
+      throw core::config_error(e.origin, "experiment." + e.key,
+                               fmt::format("unknown key; did you mean '{}'?", nearest));
     }
-    if (entry.value.kind != ConfigTree::Kind::kSequence || entry.value.items.empty()) {
-      throw core::config_error(entry.origin, key, "must be a list of at least one value");
-    }
-    axes.push_back({entry.key, entry.value.items});
   }
-  return axes;
+  return sweep;
 }
 
 // Names the place of the key, or of the innermost section that would hold it.
@@ -143,18 +141,6 @@ std::string hash_of(const Experiment& experiment) {
       {"estimator", core::resolved_config(experiment.estimator, core::PathForm::kContentHash)},
       {"eval", core::resolved_config(experiment.metrics, core::PathForm::kContentHash)}};
   return core::content_hash(content.dump());
-}
-
-// The value as it stands in the file: a number where it is one.
-ordered_json axis_value(const ConfigTree& tree) {
-  if (tree.kind == ConfigTree::Kind::kSequence) {
-    ordered_json list = ordered_json::array();
-    for (const ConfigTree& item : tree.items) list.push_back(axis_value(item));
-    return list;
-  }
-  if (tree.quoted) return tree.scalar;
-  const ordered_json parsed = ordered_json::parse(tree.scalar, nullptr, false);
-  return parsed.is_discarded() ? ordered_json(tree.scalar) : parsed;
 }
 
 // What only shows when a scenario's parts meet: pose files that are too short, worlds without room for the path, motion
@@ -202,25 +188,19 @@ void check_meeting(const ConfigTree& root, Check check) {
   }
 }
 
-void add_cells(const ConfigTree& root, const std::vector<Axis>& axes, std::size_t depth, const ordered_json& values,
-               std::vector<Cell>& cells) {
-  if (depth == axes.size()) {
-    Cell cell{.axes = values, .experiment = read_experiment(root), .config_hash = {}};
-    cell.config_hash = hash_of(cell.experiment);
-    check_meeting(root, [&] { check_cell(cell.experiment); });
-    cells.push_back(std::move(cell));
-    return;
+Cell make_cell(ConfigTree root, const Sweep& sweep, const std::vector<const ConfigTree*>& values) {
+  ordered_json axes = ordered_json::object();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    core::set_value(root, sweep.axes[i].key, *values[i]);
+    if (!sweep.axes[i].replaced) axes[sweep.axes[i].key] = plain_value(*values[i]);
   }
-  for (const ConfigTree& value : axes[depth].values) {
-    ConfigTree with_value = root;
-    core::set_value(with_value, axes[depth].key, value);
-    ordered_json with_axis = values;
-    with_axis[axes[depth].key] = axis_value(value);
-    add_cells(with_value, axes, depth + 1, with_axis, cells);
-  }
+  Cell cell{.axes = axes, .experiment = read_experiment(root), .config_hash = {}};
+  cell.config_hash = hash_of(cell.experiment);
+  check_meeting(root, [&] { check_cell(cell.experiment); });
+  return cell;
 }
 
-Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std::string& default_name) {
+Plan make_plan(const ConfigTree& root, const Sweep& sweep, const std::string& default_name) {
   Plan plan;
   plan.base = read_experiment(root);
   std::string& name = plan.base.experiment.name;
@@ -228,30 +208,50 @@ Plan make_plan(const ConfigTree& root, const std::vector<Axis>& axes, const std:
   if (name.find('/') != std::string::npos || name == "." || name == "..") {
     throw located(root, {"experiment.name", fmt::format("must be a plain name, got '{}'", name)});
   }
-  add_cells(root, axes, 0, ordered_json::object(), plan.cells);
-  std::string hashes;
-  for (const Cell& cell : plan.cells) hashes += cell.config_hash;
-  plan.config_hash = core::content_hash(hashes);
+  const auto cells = cells_of(sweep);
+  const int most_trials = std::numeric_limits<int>::max() / static_cast<int>(cells.size());
+  if (plan.base.experiment.trials > most_trials) {
+    throw located(root, {"experiment.trials", fmt::format("must be <= {} for {} cells", most_trials, cells.size())});
+  }
+  std::set<std::string> hashes;
+  std::string all_hashes;
+  for (const auto& values : cells) {
+    Cell cell = make_cell(root, sweep, values);
+    // A run's id would name two runs.
+    if (!hashes.insert(cell.config_hash).second) {
+      throw core::config_error(sweep.origin, "experiment.axes",
+                               fmt::format("the cell {} is there twice", cell.axes.dump()));
+    }
+    all_hashes += cell.config_hash;
+    plan.cells.push_back(std::move(cell));
+  }
+  plan.config_hash = core::content_hash(all_hashes);
   return plan;
 }
 
-ConfigTree apply_overrides(ConfigTree root, const std::vector<std::string>& overrides, std::vector<Axis>* axes) {
+// What must be there before files are read and axes taken.
+bool comes_first(std::string_view key) {
+  if (key == "scenario" || key == "estimator") return true;
+  return std::ranges::any_of(kSweepKeys, [&](std::string_view k) { return key == fmt::format("experiment.{}", k); });
+}
+
+ConfigTree apply_overrides(ConfigTree root, const std::vector<std::string>& overrides, Sweep* sweep) {
   std::vector<core::ConfigOverride> parsed;
   parsed.reserve(overrides.size());
   for (const std::string& text : overrides) parsed.push_back(core::parse_override(text));
   // Files first, so that keys can be set on top of them wherever the file's name was given.
   for (core::ConfigOverride& o : parsed) {
-    if (o.key == "scenario" || o.key == "estimator") core::set_value(root, o.key, o.value);
+    if (comes_first(o.key)) core::set_value(root, o.key, o.value);
   }
   include_files(root);
-  if (axes != nullptr) *axes = take_axes(root);
+  if (sweep != nullptr) *sweep = take_sweep(root);
   const ConfigTree settings = take_entry(root, "set");
   require_map(settings, "set");
   for (const ConfigEntry& entry : settings.entries) core::set_value(root, entry.key, entry.value);
   for (const core::ConfigOverride& o : parsed) {
-    if (o.key == "scenario" || o.key == "estimator") continue;
+    if (comes_first(o.key)) continue;
     core::set_value(root, o.key, o.value);
-    if (axes != nullptr) std::erase_if(*axes, [&](const Axis& axis) { return axis.key == o.key; });
+    if (sweep != nullptr) replace_axis(*sweep, o);
   }
   return root;
 }
@@ -284,12 +284,14 @@ std::string run_id(const Cell& cell, int trial) {
   return core::content_hash(fmt::format("{}/{}", cell.config_hash, trial));
 }
 
-Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>& overrides,
+               const std::vector<std::string>& only) {
   ConfigTree root = core::load_config_file(file);
   require_map(root, "");
-  std::vector<Axis> axes;
-  root = apply_overrides(std::move(root), overrides, &axes);
-  return make_plan(root, axes, file.stem().string());
+  Sweep sweep;
+  root = apply_overrides(std::move(root), overrides, &sweep);
+  keep_only(sweep, only);
+  return make_plan(root, sweep, file.stem().string());
 }
 
 sim::ScenarioConfig load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
@@ -343,7 +345,7 @@ Plan read_manifest(const std::filesystem::path& file) {
     root.entries.push_back({"experiment", experiment.origin, experiment});
     Cell cell{.axes = ordered_json::object(), .experiment = read_experiment(root), .config_hash = {}};
     const ConfigTree axes = take_entry(item, "axes");
-    for (const ConfigEntry& axis : axes.entries) cell.axes[axis.key] = axis_value(axis.value);
+    for (const ConfigEntry& axis : axes.entries) cell.axes[axis.key] = plain_value(axis.value);
     cell.config_hash = hash_of(cell.experiment);
     if (cell.config_hash != take_entry(item, "config_hash").scalar) {
       throw core::config_error(item.origin, "cells.config_hash",

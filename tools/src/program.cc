@@ -37,6 +37,12 @@ int parse_and_run(int argc, const char* const* argv) {
         ->allow_extra_args(false);
   };
 
+  const auto add_only = [](CLI::App* command, std::vector<std::string>& only) {
+    command->add_option("--only", only, "of the cells those alone with this value of an axis; repeat for alternatives")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+  };
+
   RunOptions run_options;
   CLI::App* run_command = app.add_subcommand("run", "simulate, estimate and evaluate an experiment");
   run_command->add_option("EXPERIMENT", run_options.experiment, "experiment file (YAML)")->required();
@@ -46,6 +52,23 @@ int parse_and_run(int argc, const char* const* argv) {
   run_command->add_flag("--fresh", run_options.fresh, "discard results of another configuration");
   run_command->add_flag("--json", run_options.json, "print the summary as JSON");
   add_set(run_command, run_options.set);
+  add_only(run_command, run_options.only);
+
+  PlanOptions plan_options;
+  CLI::App* plan_command = app.add_subcommand("plan", "write the manifest of an experiment without running it");
+  plan_command->add_option("EXPERIMENT", plan_options.experiment, "experiment file (YAML)")->required();
+  CLI::Option* plan_out =
+      plan_command->add_option("--out", plan_options.out, "folder of the manifest; default out/NAME");
+  plan_command->add_option("--trials", plan_options.trials, "trials of each cell");
+  CLI::Option* dry_run = plan_command
+                             ->add_flag("--dry-run", plan_options.dry_run,
+                                        "write nothing; run a trial or two and say how long all will take")
+                             ->excludes(plan_out);
+  plan_command->add_option("--jobs", plan_options.jobs, "of that estimate; default one a processor")
+      ->check(CLI::PositiveNumber)
+      ->needs(dry_run);
+  add_set(plan_command, plan_options.set);
+  add_only(plan_command, plan_options.only);
 
   SimulateOptions simulate_options;
   CLI::App* simulate_command = app.add_subcommand("simulate", "write one recording and its truth as a dataset");
@@ -96,6 +119,14 @@ int parse_and_run(int argc, const char* const* argv) {
       ->check(CLI::Range(1e-9, 0.5))
       ->capture_default_str();
   compare_command->add_flag("--json", compare_options.json, "print JSON");
+
+  ExportResultsOptions export_options;
+  CLI::App* export_command = app.add_subcommand("export-results", "write the results of a run as one file");
+  export_command->add_option("OUT_DIR", export_options.results, "folder of the results")->required();
+  export_command->add_option("--format", export_options.format, "csv or sqlite")
+      ->required()
+      ->transform(CLI::CheckedTransformer(words<ResultsFormat>(kResultsFormatNames)));
+  export_command->add_option("--out", export_options.out, "the file, which is replaced")->required();
 
   ReplayOptions replay_options;
   CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a finished experiment again");
@@ -148,10 +179,12 @@ int parse_and_run(int argc, const char* const* argv) {
     return app.exit(error) == 0 ? kExitOk : kExitBadInput;
   }
   if (*run_command) return run(run_options);
+  if (*plan_command) return plan(plan_options);
   if (*simulate_command) return simulate(simulate_options);
   if (*estimate_command) return estimate(estimate_options);
   if (*evaluate_command) return evaluate(evaluate_options);
   if (*compare_command) return compare(compare_options);
+  if (*export_command) return export_results(export_options);
   if (*replay_command) return replay(replay_options);
   if (*ba_command) return ba(ba_options);
   if (*simulate_ba_command) return simulate_ba(simulate_ba_options);

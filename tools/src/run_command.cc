@@ -115,7 +115,7 @@ ordered_json summarise_results(const Plan& plan, const std::filesystem::path& ou
 int run(const RunOptions& options) {
   std::vector<std::string> overrides = options.set;
   if (options.trials) overrides.push_back(fmt::format("experiment.trials={}", *options.trials));
-  const Plan plan = load_plan(options.experiment, overrides);
+  const Plan plan = load_plan(options.experiment, overrides, options.only);
   const std::filesystem::path out = options.out.value_or(std::filesystem::path("out") / plan.base.experiment.name);
   refuse_to_lose(out, plan, options.fresh);
   std::filesystem::create_directories(out);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string_view>
 
 namespace plumbline::core {
@@ -10,6 +11,11 @@ namespace plumbline::core {
 // `path`. A path that exists and is no regular file (a pipe, /dev/stdout) is written to directly.
 // Throws std::system_error naming the path; the temporary file is then removed.
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+
+// For what is written piece by piece: `write` makes the file whose name it is given (PATH.tmp-PID), which then becomes
+// `path`, or goes where `write` throws. Throws DataError where `path` exists and is no regular file.
+void replace_file_atomically(const std::filesystem::path& path,
+                             const std::function<void(const std::filesystem::path& temporary)>& write);
 
 // Syncs the closed file `from`, renames it to `to` and syncs the folder. Throws std::system_error.
 void publish_file(const std::filesystem::path& from, const std::filesystem::path& to);

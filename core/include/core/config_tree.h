@@ -55,8 +55,8 @@ struct ConfigOverride {
   ConfigTree value;
 };
 
-// "a.b=c", as in `--set a.b=c`; c is YAML, such as 3, word or [1, 2].
-ConfigOverride parse_override(std::string_view assignment);
+// "a.b=c", as in `--set a.b=c`; c is YAML, such as 3, word or [1, 2]. Messages name the option.
+ConfigOverride parse_override(std::string_view assignment, std::string_view option = "--set");
 
 // The value under a dotted key, or nullptr.
 const ConfigTree* find_value(const ConfigTree& root, std::string_view dotted_key);

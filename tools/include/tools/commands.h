@@ -3,10 +3,12 @@
 // Bad input is thrown as core::InputError before anything is written; program() turns it into code 2.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "eval/alignment.h"
@@ -25,10 +27,22 @@ struct RunOptions {
   std::optional<int> trials;
   int jobs = 0;  // 0: one a processor
   std::vector<std::string> set;
-  bool fresh = false;  // discard results of another configuration
+  std::vector<std::string> only;  // KEY=VALUE of an axis: these cells alone
+  bool fresh = false;             // discard results of another configuration
   bool json = false;
 };
 int run(const RunOptions& options);
+
+struct PlanOptions {
+  std::filesystem::path experiment;
+  std::optional<std::filesystem::path> out;  // out/<experiment.name>
+  std::optional<int> trials;
+  std::vector<std::string> set;
+  std::vector<std::string> only;
+  bool dry_run = false;  // writes nothing; runs a trial or two and says how long all will take
+  int jobs = 0;          // of that estimate; 0: one a processor
+};
+int plan(const PlanOptions& options);
 
 struct SimulateOptions {
   std::filesystem::path scenario;
@@ -67,6 +81,16 @@ struct CompareOptions {
   bool json = false;
 };
 int compare(const CompareOptions& options);  // kExitWorse where B is significantly worse
+
+enum class ResultsFormat { kCsv, kSqlite };
+inline constexpr std::array<std::string_view, 2> kResultsFormatNames = {"csv", "sqlite"};
+
+struct ExportResultsOptions {
+  std::filesystem::path results;  // the folder of a run
+  ResultsFormat format = ResultsFormat::kCsv;
+  std::filesystem::path out;  // a file, which is replaced
+};
+int export_results(const ExportResultsOptions& options);
 
 struct ReplayOptions {
   std::filesystem::path results;  // the folder of a run

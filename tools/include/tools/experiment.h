@@ -6,8 +6,9 @@
 //   eval: {alignment: posyaw}
 //   set: {scenario.camera.readout_s: 0.01}         (on top of the files)
 //
-// The cells are the product of the axes, the last one varying fastest. An override (--set) of an axis' key replaces
-// the axis.
+// The cells are the product of the axes, the last one varying fastest; tools/src/axes.h has ranges, axes that step
+// together, and filters. An override (--set) of an axis' key replaces the axis. What a cell is does not depend on how
+// its values were written down: the same configuration has the same run_ids.
 #pragma once
 
 #include <cstdint>
@@ -64,9 +65,10 @@ struct Plan {
 // 16 hexadecimal digits that name a trial of a cell anywhere.
 std::string run_id(const Cell& cell, int trial);
 
-// `overrides` are those of --set. Throws core::ConfigError or core::DataError, in one line; every cell is checked,
-// with the pose files they name.
-Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>& overrides);
+// `overrides` are those of --set; where there are some of --only, the plan has only their cells. Throws
+// core::ConfigError or core::DataError, in one line; every cell is checked, with the pose files they name.
+Plan load_plan(const std::filesystem::path& file, const std::vector<std::string>& overrides,
+               const std::vector<std::string>& only = {});
 
 // A scenario or an estimator alone. Keys of overrides start with "scenario." or "estimator.".
 sim::ScenarioConfig load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides);
