@@ -1,5 +1,6 @@
 // Google Benchmark of the parts that a trial spends its time in: build/<preset>/tools/plumbline_benchmarks
 #include <filesystem>
+#include <functional>
 
 #include <benchmark/benchmark.h>
 
@@ -25,13 +26,28 @@ sim::ScenarioConfig handheld_rs() {
   return c;
 }
 
-void simulate(benchmark::State& state) {
-  const sim::ScenarioConfig config = handheld_rs();
+void simulate_scenario(benchmark::State& state, const sim::ScenarioConfig& config,
+                       const std::function<void(const sim::Simulation&)>& use = {}) {
   std::uint64_t trial = 0;
-  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(sim::simulate(config, {1, trial++}));
+  std::size_t points = 0;
+  std::size_t lines = 0;
+  std::size_t frames = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    const sim::Simulation s = sim::simulate(config, {1, trial++});
+    for (const core::Frame& frame : s.measurements.frames) {
+      points += frame.points.size();
+      lines += frame.lines.size();
+    }
+    frames += s.measurements.frames.size();
+    if (use) use(s);
+  }
   state.counters["times_real_time"] =
       benchmark::Counter(config.duration_s * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["points_a_frame"] = static_cast<double>(points) / static_cast<double>(frames);
+  state.counters["lines_a_frame"] = static_cast<double>(lines) / static_cast<double>(frames);
 }
+
+void simulate(benchmark::State& state) { simulate_scenario(state, handheld_rs()); }
 BENCHMARK(simulate)->Unit(benchmark::kMillisecond);
 
 // 60 s with every defect of both sensors and a lens.
@@ -62,23 +78,10 @@ sim::ScenarioConfig everything_on() {
   return c;
 }
 
-void simulate_with_all_defects(benchmark::State& state) {
-  const sim::ScenarioConfig config = everything_on();
-  std::uint64_t trial = 0;
-  std::size_t points = 0;
-  std::size_t frames = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    const sim::Simulation s = sim::simulate(config, {1, trial++});
-    for (const core::Frame& frame : s.measurements.frames) points += frame.points.size();
-    frames += s.measurements.frames.size();
-  }
-  state.counters["times_real_time"] =
-      benchmark::Counter(config.duration_s * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
-  state.counters["points_a_frame"] = static_cast<double>(points) / static_cast<double>(frames);
-}
+void simulate_with_all_defects(benchmark::State& state) { simulate_scenario(state, everything_on()); }
 BENCHMARK(simulate_with_all_defects)->Unit(benchmark::kMillisecond);
 
-// 100 points and 40 lines a frame in rooms whose walls hide what is behind them, written with its truth.
+// 100 points and 40 lines a frame in rooms whose walls hide what is behind them.
 sim::ScenarioConfig line_rooms() {
   sim::ScenarioConfig c = handheld_rs();
   c.duration_s = 60.0;
@@ -88,7 +91,7 @@ sim::ScenarioConfig line_rooms() {
   c.world.type = sim::WorldType::kRooms;
   c.world.landmarks = 6000;
   c.world.lines.windows.spacing_m = 2.0;
-  c.world.lines.random = 400;
+  c.world.lines.random = 800;
   c.lines.per_frame = 40;
   c.lines.slide_sigma_px = 3.0;
   c.lines.fragment_probability = 0.01;
@@ -97,31 +100,19 @@ sim::ScenarioConfig line_rooms() {
   return c;
 }
 
+void simulate_lines(benchmark::State& state) { simulate_scenario(state, line_rooms()); }
+BENCHMARK(simulate_lines)->Unit(benchmark::kMillisecond);
+
 void simulate_and_write_lines(benchmark::State& state) {
-  const sim::ScenarioConfig config = line_rooms();
   const std::filesystem::path folder = std::filesystem::temp_directory_path() / "plumbline_benchmark_lines";
   std::filesystem::remove_all(folder);
-  std::uint64_t trial = 0;
-  std::size_t points = 0;
-  std::size_t lines = 0;
-  std::size_t frames = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    const sim::Simulation s = sim::simulate(config, {1, trial++});
+  simulate_scenario(state, line_rooms(), [&](const sim::Simulation& s) {
     core::write_dataset(folder, s.measurements, {});
     sim::write_truth(folder, s.truth);
-    for (const core::Frame& frame : s.measurements.frames) {
-      points += frame.points.size();
-      lines += frame.lines.size();
-    }
-    frames += s.measurements.frames.size();
     state.PauseTiming();
     std::filesystem::remove_all(folder);
     state.ResumeTiming();
-  }
-  state.counters["times_real_time"] =
-      benchmark::Counter(config.duration_s * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
-  state.counters["points_a_frame"] = static_cast<double>(points) / static_cast<double>(frames);
-  state.counters["lines_a_frame"] = static_cast<double>(lines) / static_cast<double>(frames);
+  });
 }
 BENCHMARK(simulate_and_write_lines)->Unit(benchmark::kMillisecond);
 
