@@ -304,7 +304,7 @@ TEST_F(CommandLine, PlanWritesTheManifestOfTheRunAndNeverAnother) {
 
 TEST_F(CommandLine, DryRunOfAPlanWritesNothing) {
   const std::vector<std::string> before = listing(folder_);
-  const Result result = plumbline("plan small.yaml --dry-run --jobs 2");
+  const Result result = plumbline("plan small.yaml --out out --dry-run --jobs 2");
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("small: 2 cells x 3 trials = 6 runs\n"));
   EXPECT_THAT(result.out, HasSubstr("probe: cell {\"scenario.camera.td_s\":0}, "));

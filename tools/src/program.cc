@@ -57,13 +57,10 @@ int parse_and_run(int argc, const char* const* argv) {
   PlanOptions plan_options;
   CLI::App* plan_command = app.add_subcommand("plan", "write the manifest of an experiment without running it");
   plan_command->add_option("EXPERIMENT", plan_options.experiment, "experiment file (YAML)")->required();
-  CLI::Option* plan_out =
-      plan_command->add_option("--out", plan_options.out, "folder of the manifest; default out/NAME");
+  plan_command->add_option("--out", plan_options.out, "folder of the manifest; default out/NAME");
   plan_command->add_option("--trials", plan_options.trials, "trials of each cell");
-  CLI::Option* dry_run = plan_command
-                             ->add_flag("--dry-run", plan_options.dry_run,
-                                        "write nothing; run a trial or two and say how long all will take")
-                             ->excludes(plan_out);
+  CLI::Option* dry_run = plan_command->add_flag("--dry-run", plan_options.dry_run,
+                                                "write nothing; run a trial or two and say how long all will take");
   plan_command->add_option("--jobs", plan_options.jobs, "of that estimate; default one a processor")
       ->check(CLI::PositiveNumber)
       ->needs(dry_run);
