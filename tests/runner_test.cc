@@ -1,23 +1,33 @@
 #include "eval/runner.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <memory>
 #include <new>
 #include <numeric>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "core/error.h"
 #include "eval/progress.h"
@@ -54,45 +64,80 @@ Row make_row(int index) {
   return row;
 }
 
-// Trials that take the longer the earlier they are, so that they end out of order.
-Row slow_row(int index) {
-  std::this_thread::sleep_for(std::chrono::microseconds(200 * (index % 7)));
-  return make_row(index);
+using Launcher = void (*)(const std::vector<int>&, const TrialRun&);
+
+std::vector<int> first(int count) {
+  std::vector<int> indices(static_cast<std::size_t>(count));
+  std::iota(indices.begin(), indices.end(), 0);
+  return indices;
 }
 
-TrialHandlers<Row> into(ResultWriter& writer) {
-  return {.sink = [&writer](int index, const Row& row) { writer.add(index, row); },
-          .failed_row =
-              [](int index, const std::exception& error) {
-                Row row = make_row(index);
-                row.ok = false;
-                row.status = "exception";
-                row.reason = error.what();
-                row.metrics.clear();
-                return row;
-              },
-          .incident = [](int) { FAIL(); }};
+// By index.
+std::map<int, TrialEnd> launch(Launcher launcher, int count, int jobs, std::function<std::string(int)> trial,
+                               double cpu_limit_s = 0.0) {
+  std::map<int, TrialEnd> ends;
+  const auto sink = [&](const TrialEnd& end) { EXPECT_TRUE(ends.emplace(end.index, end).second) << end.index; };
+  launcher(first(count), {.trial = std::move(trial), .sink = sink, .jobs = jobs, .cpu_limit_s = cpu_limit_s});
+  return ends;
 }
 
-TEST(Runner, TheNumberOfThreadsChangesNothing) {
-  std::string expected;
+class Launchers : public testing::TestWithParam<Launcher> {};
+INSTANTIATE_TEST_SUITE_P(Runner, Launchers, testing::Values(run_in_threads, run_in_processes),
+                         [](const auto& launcher) { return launcher.index == 0 ? "threads" : "processes"; });
+
+TEST_P(Launchers, EachTrialEndsOnceHoweverManyRun) {
+  const auto trial = [](int index) -> std::string {
+    if (index % 10 == 3) throw std::runtime_error("trial " + std::to_string(index) + " broke");
+    if (index == 14) throw 42;
+    if (index == 25) throw std::bad_alloc();
+    return std::string(static_cast<std::size_t>(index) * 5'000, static_cast<char>('a' + index % 26));
+  };
   for (const int jobs : {1, 2, 8}) {
-    const fs::path path = scratch("results.jsonl");
-    ResultWriter writer(path);
-    const auto trial = [](int index) -> Row {
-      if (index % 10 == 3) throw std::runtime_error("trial " + std::to_string(index) + " broke");
-      if (index == 14) throw 42;
-      return slow_row(index);
-    };
-    EXPECT_EQ(run_trials<Row>(60, jobs, trial, into(writer)), 60);
-    writer.finish();
-    if (expected.empty()) expected = contents(path);
-    EXPECT_EQ(contents(path), expected) << jobs << " threads";
-    EXPECT_FALSE(fs::exists(path.string() + ".tmp"));
+    const auto ends = launch(GetParam(), 60, jobs, trial);
+    ASSERT_EQ(ends.size(), 60U);
+    for (const auto& [index, end] : ends) {
+      if (index % 10 == 3) {
+        EXPECT_EQ(end.outcome, Outcome::kException);
+        EXPECT_EQ(end.text, "trial " + std::to_string(index) + " broke");
+      } else if (index == 14) {
+        EXPECT_EQ(end.text, "an exception of unknown type");
+      } else if (index == 25) {
+        EXPECT_EQ(end.outcome, Outcome::kOutOfMemory);
+      } else {
+        EXPECT_EQ(end.outcome, Outcome::kAnswer);
+        EXPECT_EQ(end.text, trial(index));  // also of more bytes than a socket holds
+      }
+    }
   }
-  EXPECT_EQ(std::count(expected.begin(), expected.end(), '\n'), 60);
-  EXPECT_NE(expected.find("trial 13 broke"), std::string::npos);
-  EXPECT_NE(expected.find("an exception of unknown type"), std::string::npos);
+  EXPECT_TRUE(launch(GetParam(), 0, 1, trial).empty());
+  EXPECT_THROW(launch(GetParam(), 1, 0, trial), std::invalid_argument);
+}
+
+TEST_P(Launchers, CancelledRunsFinishWhatIsUnderWay) {
+  std::atomic<bool> cancel = false;
+  std::vector<int> ended;
+  const auto sink = [&](const TrialEnd& end) {
+    EXPECT_EQ(end.outcome, Outcome::kAnswer);
+    ended.push_back(end.index);
+    if (end.index == 20) cancel = true;
+  };
+  const auto trial = [](int index) {
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+    return std::to_string(index);
+  };
+  GetParam()(first(100'000), {.trial = trial, .sink = sink, .jobs = 4, .cancel = &cancel});
+  EXPECT_GE(ended.size(), 21U);
+  EXPECT_LT(ended.size(), 1000U);
+  std::sort(ended.begin(), ended.end());
+  EXPECT_EQ(ended, first(static_cast<int>(ended.size())));  // none that was begun is missing
+}
+
+TEST_P(Launchers, AnErrorOfTheSinkReachesTheCaller) {
+  const auto sink = [](const TrialEnd& end) {
+    if (end.index == 3) throw std::runtime_error("disk full");
+  };
+  const auto trial = [](int index) { return std::to_string(index); };
+  EXPECT_THROW(GetParam()(first(100), {.trial = trial, .sink = sink, .jobs = 4}), std::runtime_error);
 }
 
 // The trials wait for company rather than for a time, since a loaded machine starts threads late.
@@ -100,7 +145,7 @@ TEST(Runner, UsesAsManyThreadsAsAsked) {
   std::atomic<int> running = 0;
   std::atomic<int> most = 0;
   int awaited = 1;
-  const auto trial = [&](int) {
+  const auto trial = [&](int) -> std::string {
     const int now = ++running;
     for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
     }
@@ -109,67 +154,109 @@ TEST(Runner, UsesAsManyThreadsAsAsked) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     --running;
-    return 0;
+    return "";
   };
-  const TrialHandlers<int> handlers{.sink = [](int, int) {}, .failed_row = {}, .incident = {}};
-  run_trials<int>(20, 1, trial, handlers);
+  launch(run_in_threads, 20, 1, trial);
   EXPECT_EQ(most, 1);
   awaited = 4;
-  run_trials<int>(60, 4, trial, handlers);
+  launch(run_in_threads, 60, 4, trial);
   EXPECT_EQ(most, 4);
 }
 
-TEST(Runner, RunningOutOfMemoryIsAnIncidentNotARow) {
-  std::vector<int> rows;
-  std::vector<int> incidents;
-  const TrialHandlers<int> handlers{.sink = [&](int index, int) { rows.push_back(index); },
-                                    .failed_row = [](int, const std::exception&) { return -1; },
-                                    .incident = [&](int index) { incidents.push_back(index); }};
-  const auto trial = [](int index) -> int {
-    if (index == 2) throw std::bad_alloc();
-    return index;
+TEST(Runner, UsesAsManyProcessesAsAsked) {
+  const auto trial = [](int) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return std::to_string(::getpid());
   };
-  EXPECT_EQ(run_trials<int>(5, 2, trial, handlers), 5);
-  EXPECT_EQ(rows, std::vector<int>({0, 1, 3, 4}));
-  EXPECT_EQ(incidents, std::vector<int>({2}));
+  std::set<std::string> workers;
+  for (const auto& [index, end] : launch(run_in_processes, 60, 4, trial)) workers.insert(end.text);
+  EXPECT_EQ(workers.size(), 4U);
+  EXPECT_FALSE(workers.contains(std::to_string(::getpid())));
 }
 
-TEST(Runner, CancelledRunsLeaveNoHoles) {
-  std::atomic<bool> cancel = false;
-  std::vector<int> rows;
-  const TrialHandlers<int> handlers{.sink =
-                                        [&](int index, int) {
-                                          rows.push_back(index);
-                                          if (index == 20) cancel = true;
-                                        },
-                                    .failed_row = {},
-                                    .incident = {}};
-  const auto trial = [](int index) {
-    std::this_thread::sleep_for(std::chrono::microseconds(100));
-    return index;
-  };
-  const int delivered = run_trials<int>(100'000, 4, trial, handlers, &cancel);
-  EXPECT_GE(delivered, 21);
-  EXPECT_LT(delivered, 1000);
-  std::vector<int> expected(rows.size());
-  std::iota(expected.begin(), expected.end(), 0);
-  EXPECT_EQ(rows, expected);
-  EXPECT_EQ(std::ssize(rows), delivered);
+// By its default action, also where a sanitizer handles it.
+[[noreturn]] void die_of(int signal) {
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+  std::abort();
 }
 
-TEST(Runner, AnErrorOfTheSinkReachesTheCaller) {
-  const TrialHandlers<int> handlers{.sink =
-                                        [](int index, int) {
-                                          if (index == 3) throw std::runtime_error("disk full");
-                                        },
-                                    .failed_row = [](int, const std::exception&) { return 0; },
-                                    .incident = {}};
-  EXPECT_THROW(run_trials<int>(100, 4, [](int index) { return index; }, handlers), std::runtime_error);
-  const auto broken = [](int) -> std::function<void()> { throw std::runtime_error("work"); };
-  EXPECT_THROW(run_in_order(100, 4, broken), std::runtime_error);
-  EXPECT_THROW(run_in_order(-1, 1, {}), std::invalid_argument);
-  EXPECT_THROW(run_in_order(1, 0, {}), std::invalid_argument);
-  EXPECT_EQ(run_in_order(0, 1, {}), 0);
+TEST(Runner, AWorkerThatDiesIsReplacedAndTellsWhy) {
+  const auto trial = [](int index) -> std::string {
+    switch (index) {
+      case 2:
+        die_of(SIGSEGV);
+      case 5:
+        std::abort();
+      case 7:
+        std::_Exit(9);
+      case 11:
+        die_of(SIGKILL);
+      case 13:
+        for (std::atomic<int> spin = 0;; ++spin) {
+        }
+      default:
+        return std::to_string(index);
+    }
+  };
+  const auto ends = launch(run_in_processes, 20, 3, trial, 0.2);
+  ASSERT_EQ(ends.size(), 20U);
+  const auto expect = [&](int index, Outcome outcome, const char* text) {
+    EXPECT_EQ(ends.at(index).outcome, outcome) << index;
+    EXPECT_EQ(ends.at(index).text, text);
+  };
+  expect(2, Outcome::kCrash, "killed by SIGSEGV");
+  expect(5, Outcome::kCrash, "killed by SIGABRT");
+  expect(7, Outcome::kCrash, "left with exit code 9");
+  expect(11, Outcome::kKilled, "killed by SIGKILL");
+  expect(13, Outcome::kCpuLimit, "cpu limit");
+  for (const int index : {0, 1, 3, 4, 6, 8, 9, 10, 12, 14, 19}) {
+    expect(index, Outcome::kAnswer, std::to_string(index).c_str());
+  }
+}
+
+// The limit is one trial's, not that of all that a worker has run.
+TEST(Runner, TheCpuLimitBeginsAnewWithEachTrial) {
+  const auto trial = [](int) -> std::string {
+    const std::clock_t end = std::clock() + CLOCKS_PER_SEC / 10;
+    while (std::clock() < end) {
+    }
+    return "";
+  };
+  for (const auto& [index, end] : launch(run_in_processes, 6, 1, trial, 0.3)) {
+    EXPECT_EQ(end.outcome, Outcome::kAnswer) << index;
+  }
+}
+
+bool is_running(::pid_t pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string number;
+  std::string name;
+  std::string state;
+  return stat >> number >> name >> state && state != "Z" && state != "X";
+}
+
+TEST(Runner, WorkersDieWithTheirParent) {
+  std::array<int, 2> pipe{};
+  ASSERT_EQ(::pipe(pipe.data()), 0);
+  const ::pid_t parent = ::fork();
+  if (parent == 0) {
+    const auto trial = [&](int) -> std::string {
+      const ::pid_t me = ::getpid();
+      if (::write(pipe[1], &me, sizeof me) != sizeof me) std::abort();
+      for (;;) ::pause();
+    };
+    run_in_processes(first(2), {.trial = trial, .sink = [](const TrialEnd&) {}, .jobs = 2});
+    std::_Exit(0);
+  }
+  std::array<::pid_t, 2> workers{};
+  for (::pid_t& worker : workers) ASSERT_EQ(::read(pipe[0], &worker, sizeof worker), ssize_t{sizeof worker});
+  ::kill(parent, SIGKILL);
+  ASSERT_EQ(::waitpid(parent, nullptr, 0), parent);
+  for (const ::pid_t worker : workers) {
+    for (int i = 0; i < 1000 && is_running(worker); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_FALSE(is_running(worker));
+  }
 }
 
 TEST(ResultStore, ALineIsWhatIsDocumented) {
@@ -230,25 +317,6 @@ TEST(ResultStore, RefusesWhatItDidNotWrite) {
             "f:9: solver: final_cost: wrong type or out of range");
 }
 
-TEST(ResultStore, TheFileIsAPrefixUntilItIsWhole) {
-  const fs::path path = scratch("results.jsonl");
-  const std::string partial = path.string() + ".tmp";
-  ResultWriter writer(path);
-  writer.add(2, make_row(2));
-  writer.add(1, make_row(1));
-  EXPECT_EQ(contents(partial), "");
-  EXPECT_THROW(writer.finish(), std::logic_error);
-  writer.add(0, make_row(0));
-  EXPECT_EQ(contents(partial), to_line(make_row(0)) + "\n" + to_line(make_row(1)) + "\n" + to_line(make_row(2)) + "\n");
-  EXPECT_THROW(writer.add(1, make_row(1)), std::logic_error);
-  EXPECT_FALSE(fs::exists(path));
-  writer.finish();
-  EXPECT_FALSE(fs::exists(partial));
-  int count = 0;
-  for_each_row(path, Tail::kWhole, [&](const Row& row) { EXPECT_EQ(row.run_id, make_row(count++).run_id); });
-  EXPECT_EQ(count, 3);
-}
-
 TEST(ResultStore, ATornLastLineIsLeftOutOnlyWhereAsked) {
   const fs::path path = scratch("results.jsonl.tmp");
   const std::string two = to_line(make_row(0)) + "\n" + to_line(make_row(1)) + "\n";
@@ -261,22 +329,31 @@ TEST(ResultStore, ATornLastLineIsLeftOutOnlyWhereAsked) {
 }
 
 TEST(Progress, TellsWhatIsLeft) {
-  EXPECT_EQ(progress_line(50, 100, 1, 65.0), "[###############...............]  50/100  1 failed  eta 0:01:05");
-  EXPECT_EQ(progress_line(0, 100, 0, 3.0), "[..............................]  0/100");
-  EXPECT_EQ(progress_line(100, 100, 0, 3.0), "[##############################]  100/100");
+  EXPECT_EQ(progress_line({.total = 100, .done = 50, .failed = 1, .worst = "0.2 m"}, 65.0),
+            "[###############...............]  50/100  49 ok  1 failed  eta 0:01:05  worst 0.2 m");
+  // Half of what this program had to do is done.
+  EXPECT_EQ(progress_line({.total = 100, .before = 50, .done = 75, .incidents = 2, .worst = {}}, 65.0),
+            "[######################........]  75/100  73 ok  2 incidents  eta 0:01:05");
+  EXPECT_EQ(progress_line({.total = 100, .worst = {}}, 3.0), "[..............................]  0/100");
+  EXPECT_EQ(progress_line({.total = 100, .done = 100, .worst = {}}, 3.0),
+            "[##############################]  100/100  100 ok");
 }
 
-TEST(Progress, IsSilentWithoutATerminal) {
-  const fs::path path = scratch("log");
-  const auto close = [](std::FILE* stream) { std::fclose(stream); };
-  std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "w"), close);
-  ASSERT_NE(file, nullptr);
-  {
-    Progress progress(file.get(), 10);
-    for (int k = 0; k < 10; ++k) progress.add(true);
-  }
-  file.reset();
-  EXPECT_EQ(contents(path), "");
+TEST(Progress, WritesALineNowAndThenWithoutATerminal) {
+  const auto lines = [](std::chrono::seconds period) {
+    const fs::path path = scratch("log");
+    const auto close = [](std::FILE* stream) { std::fclose(stream); };
+    std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "w"), close);
+    {
+      Progress progress(file.get(), period);
+      for (int k = 1; k <= 10; ++k) progress.show({.total = 10, .done = k, .worst = {}});
+    }
+    file.reset();
+    const std::string text = contents(path);
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  EXPECT_EQ(lines(std::chrono::seconds(30)), 0);
+  EXPECT_EQ(lines(std::chrono::seconds(0)), 10);
 }
 
 }  // namespace

@@ -7,33 +7,41 @@
 
 namespace plumbline::eval {
 
-std::string progress_line(int done, int total, int failed, double elapsed_s) {
+std::string progress_line(const ProgressCounts& c, double elapsed_s) {
   constexpr int kBar = 30;
-  const int filled = total > 0 ? static_cast<int>(static_cast<long long>(kBar) * done / total) : kBar;
-  std::string line = fmt::format("[{:#<{}}{:.<{}}]  {}/{}", "", filled, "", kBar - filled, done, total);
-  if (failed > 0) line += fmt::format("  {} failed", failed);
-  if (done > 0 && done < total) {
-    const long long left = std::llround(elapsed_s * (total - done) / done);
+  const int filled = c.total > 0 ? static_cast<int>(static_cast<long long>(kBar) * c.done / c.total) : kBar;
+  std::string line = fmt::format("[{:#<{}}{:.<{}}]  {}/{}", "", filled, "", kBar - filled, c.done, c.total);
+  if (c.done > 0) line += fmt::format("  {} ok", c.done - c.failed - c.incidents);
+  if (c.failed > 0) line += fmt::format("  {} failed", c.failed);
+  if (c.incidents > 0) line += fmt::format("  {} incidents", c.incidents);
+  if (c.done > c.before && c.done < c.total) {
+    const long long left = std::llround(elapsed_s * (c.total - c.done) / (c.done - c.before));
     line += fmt::format("  eta {}:{:02}:{:02}", left / 3600, left / 60 % 60, left % 60);
   }
+  if (!c.worst.empty()) line += "  worst " + c.worst;
   return line;
 }
 
-Progress::Progress(std::FILE* stream, int total)
-    : stream_(::isatty(::fileno(stream)) != 0 ? stream : nullptr), total_(total) {}
-
-Progress::~Progress() {
-  if (stream_ != nullptr) fmt::print(stream_, "\r\x1b[K");
+Progress::Progress(std::FILE* stream, std::chrono::seconds log_period)
+    : stream_(stream), is_terminal_(::isatty(::fileno(stream)) != 0) {
+  period_ = is_terminal_ ? Clock::duration(std::chrono::milliseconds(100)) : Clock::duration(log_period);
 }
 
-void Progress::add(bool ok) {
-  ++done_;
-  failed_ += ok ? 0 : 1;
+Progress::~Progress() {
+  if (is_terminal_) fmt::print(stream_, "\r\x1b[K");
+}
+
+void Progress::show(const ProgressCounts& counts) {
   const auto now = Clock::now();
-  if (stream_ == nullptr || now - drawn_ < std::chrono::milliseconds(100)) return;
-  drawn_ = now;
-  const double elapsed_s = std::chrono::duration<double>(now - start_).count();
-  fmt::print(stream_, "\r{}\x1b[K", progress_line(done_, total_, failed_, elapsed_s));
+  if (now - shown_ < period_) return;
+  shown_ = now;
+  const std::string line = progress_line(counts, std::chrono::duration<double>(now - start_).count());
+  fmt::print(stream_, "{}{}{}", is_terminal_ ? "\r" : "", line, is_terminal_ ? "\x1b[K" : "\n");
+  std::fflush(stream_);
+}
+
+void Progress::say(std::string_view line) {
+  fmt::print(stream_, "{}{}\n", is_terminal_ ? "\r\x1b[K" : "", line);
   std::fflush(stream_);
 }
 

@@ -1,18 +1,15 @@
 #include "eval/result_store.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <system_error>
 #include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "core/atomic_file.h"
 #include "core/error.h"
 
 namespace plumbline::eval {
@@ -170,31 +167,6 @@ void for_each_row(const std::filesystem::path& path, Tail tail, const std::funct
     }
     use(parse_row(line, where));
   }
-}
-
-ResultWriter::ResultWriter(std::filesystem::path path)
-    : path_(std::move(path)), file_(path_.string() + ".tmp", std::ios::binary | std::ios::trunc) {
-  if (!file_) throw std::system_error(errno, std::generic_category(), path_.string() + ".tmp: cannot open");
-}
-
-void ResultWriter::add(int index, const Row& row) {
-  std::string line = to_line(row) + '\n';
-  const std::lock_guard lock(mutex_);
-  if (index < next_ || !waiting_.emplace(index, std::move(line)).second) {
-    throw std::logic_error(fmt::format("result {} was written already", index));
-  }
-  for (auto it = waiting_.begin(); it != waiting_.end() && it->first == next_; it = waiting_.erase(it), ++next_) {
-    file_ << it->second << std::flush;
-  }
-  if (!file_) throw std::system_error(errno, std::generic_category(), path_.string() + ".tmp: cannot write");
-}
-
-void ResultWriter::finish() {
-  const std::lock_guard lock(mutex_);
-  if (!waiting_.empty()) throw std::logic_error(fmt::format("result {} never came", next_));
-  file_.close();
-  if (!file_) throw std::system_error(errno, std::generic_category(), path_.string() + ".tmp: cannot write");
-  core::publish_file(path_.string() + ".tmp", path_);
 }
 
 }  // namespace plumbline::eval

@@ -1,70 +1,24 @@
 #include "tools/commands.h"
 
 #include <exception>
-#include <optional>
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
-#include "core/atomic_file.h"
 #include "core/dataset.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "core/pose_file.h"
 #include "core/resolved_config.h"
 #include "estimator/estimate.h"
-#include "eval/result_store.h"
-#include "eval/series.h"
+#include "output_folders.h"
 #include "sim/simulate.h"
 #include "sim/trajectory.h"
-#include "sim/truth_files.h"
 #include "tools/experiment.h"
 #include "tools/export_results.h"
 #include "tools/plot.h"
-#include "tools/run_trial.h"
-#include "tools/version.h"
 
 namespace plumbline::tools {
 namespace {
-
-using nlohmann::ordered_json;
-
-// A recording with its truth beside it.
-void write_simulation(const std::filesystem::path& folder, const sim::Simulation& simulation,
-                      const core::DatasetMeta& meta) {
-  core::write_dataset(folder, simulation.measurements, meta);
-  sim::write_truth(folder, simulation.truth);
-}
-
-// estimate.tum and meta.yaml, as an external program would write them.
-void write_estimate(const std::filesystem::path& folder, const core::EstimateLog& estimate) {
-  std::filesystem::create_directories(folder);
-  std::vector<core::StampedPose> poses;
-  poses.reserve(estimate.states.size());
-  for (const core::StampedState& s : estimate.states) poses.push_back({s.t_ns, s.state.T_W_B});
-  core::write_tum(folder / "estimate.tum", poses);
-  const auto sigma = [&](int i) { return std::sqrt(estimate.covariance(i, i)); };
-  ordered_json covariance = ordered_json::array();
-  for (int r = 0; r < core::kCovDim; ++r) {
-    for (int c = 0; c < core::kCovDim; ++c) covariance.push_back(estimate.covariance(r, c));
-  }
-  ordered_json meta = {{"schema", "plumbline-estimate/1"},
-                       {"version", version()},
-                       {"status", core::kSolveStatusNames[static_cast<std::size_t>(estimate.status)]},
-                       {"reason", estimate.reason},
-                       {"stamp_clock", "imu"},
-                       {"td_reference_row", "middle"},
-                       {"calibration", core::resolved_config(estimate.calibration)},
-                       {"td_sigma_s", sigma(core::kCovTd)},
-                       {"readout_sigma_s", sigma(core::kCovReadout)},
-                       {"iterations", estimate.summary.iterations},
-                       {"final_cost", estimate.summary.final_cost},
-                       {"cost_per_dof", estimate.summary.cost_per_dof()},
-                       {"covariance_order", "p_B_C, theta_B_C, td, readout, last state (p, theta, v, b_g, b_a)"},
-                       {"covariance", covariance}};
-  core::write_file_atomically(folder / "meta.yaml", core::to_yaml(meta));
-}
 
 // The file read as one of that kind, in words.
 std::string load_as(ConfigKind kind, const std::filesystem::path& file, const std::vector<std::string>& set) {
@@ -82,15 +36,6 @@ std::string load_as(ConfigKind kind, const std::filesystem::path& file, const st
       return "estimator";
   }
   throw std::logic_error("load_as: unknown kind");
-}
-
-// Throws where the folder, which need not be there yet, holds something already, or is to lie below a file.
-void refuse_existing(const std::filesystem::path& folder) {
-  core::require_no_file_above(folder);
-  const bool empty = std::filesystem::is_directory(folder) && std::filesystem::is_empty(folder);
-  if (std::filesystem::exists(folder) && !empty) {
-    throw core::DataError(fmt::format("{}: exists and is not an empty folder", folder.generic_string()));
-  }
 }
 
 }  // namespace
@@ -172,60 +117,6 @@ int export_results(const ExportResultsOptions& options) {
   }
   fmt::print("{}\n", options.out.generic_string());
   return kExitOk;
-}
-
-int replay(const ReplayOptions& options) {
-  if (options.out) refuse_existing(*options.out);
-  const Plan plan = read_manifest(options.results / "manifest.json");
-  const int trials = plan.base.experiment.trials;
-  for (const Cell& cell : plan.cells) {
-    for (int trial = 0; trial < trials; ++trial) {
-      if (run_id(cell, trial) != options.run_id) continue;
-      const core::TrialId id{plan.base.experiment.seed, static_cast<std::uint64_t>(trial)};
-      eval::Row row;
-      row.run_id = options.run_id;
-      row.cell = static_cast<int>(&cell - plan.cells.data());
-      row.trial = trial;
-      row.seed = id.seed;
-      eval::TrialResult result;
-      try {
-        result = run_trial(cell.experiment, id);
-      } catch (const core::InputError&) {
-        throw;
-      } catch (const std::exception& error) {
-        result.status = "exception";
-        result.reason = error.what();
-      }
-      row = eval::with_result(row, result);
-      if (options.out) {
-        const sim::Simulation simulation = sim::simulate(cell.experiment.scenario, id);
-        write_simulation(*options.out / "dataset", simulation,
-                         {.config_hash = cell.config_hash, .seed = id.seed, .trial = id.trial});
-        write_estimate(*options.out / "estimate",
-                       estimator::estimate(simulation.measurements, cell.experiment.estimator));
-        core::write_file_atomically(*options.out / "series.json", eval::to_json(result.series).dump() + "\n");
-      }
-      const std::string line = eval::to_line(row);
-      fmt::print("{}\n", line);
-
-      std::optional<std::string> stored;
-      const std::filesystem::path results = options.results / "results.jsonl";
-      if (std::filesystem::exists(results)) {
-        eval::for_each_row(results, eval::Tail::kWhole, [&](const eval::Row& r) {
-          if (r.run_id == options.run_id) stored = eval::to_line(r);
-        });
-      }
-      if (!stored) return kExitOk;
-      if (*stored == line) {
-        fmt::print(stderr, "identical to the stored row\n");
-        return kExitOk;
-      }
-      fmt::print(stderr, "differs from the stored row:\n{}\n", *stored);
-      return kExitWorse;
-    }
-  }
-  throw core::DataError(
-      fmt::format("{}: no run with id '{}'", (options.results / "manifest.json").generic_string(), options.run_id));
 }
 
 int check(const CheckOptions& options) {

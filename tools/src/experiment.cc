@@ -38,6 +38,8 @@ void visit(core::ConfigVisitor& v, ExperimentConfig& c) {
   v.value("trials", c.trials, core::between(1, 10'000'000), "of each cell");
   v.value("seed", c.seed, core::any(), "of all draws");
   v.value("max_failed_share", c.max_failed_share, core::probability(), "more failed trials than this: exit code 1");
+  v.value("cpu_limit_s", c.cpu_limit_s, core::non_negative(),
+          "processor time of a trial, after which its worker process is ended; 0: none");
 }
 
 void visit(core::ConfigVisitor& v, Experiment& c) {

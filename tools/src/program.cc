@@ -1,8 +1,10 @@
 #include "tools/program.h"
 
+#include <charconv>
 #include <cstdio>
 #include <exception>
 #include <map>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -14,8 +16,10 @@
 #include "tools/commands.h"
 #include "tools/version.h"
 
-// Of OpenBLAS, where it is the BLAS in use: one thread a trial, and the same bytes whatever the number of processors.
+// Of OpenBLAS, where it is the BLAS in use, and of OpenMP, which CHOLMOD uses: one thread a trial, and the same bytes
+// whatever the number of processors.
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+extern "C" void omp_set_max_active_levels(int) __attribute__((weak));
 
 namespace plumbline::tools {
 namespace {
@@ -25,6 +29,17 @@ std::map<std::string, T> words(const auto& names) {
   std::map<std::string, T> result;
   for (std::size_t i = 0; i < names.size(); ++i) result.emplace(names[i], static_cast<T>(i));
   return result;
+}
+
+// I/M with 0 <= I < M.
+std::optional<Shard> parse_shard(std::string_view text) {
+  Shard shard;
+  const char* const end = text.data() + text.size();
+  const auto [slash, error] = std::from_chars(text.data(), end, shard.index);
+  if (error != std::errc() || slash == end || *slash != '/') return std::nullopt;
+  const auto [last, error_of] = std::from_chars(slash + 1, end, shard.of);
+  if (error_of != std::errc() || last != end || shard.index < 0 || shard.index >= shard.of) return std::nullopt;
+  return shard;
 }
 
 int parse_and_run(int argc, const char* const* argv) {
@@ -45,11 +60,24 @@ int parse_and_run(int argc, const char* const* argv) {
 
   RunOptions run_options;
   CLI::App* run_command = app.add_subcommand("run", "simulate, estimate and evaluate an experiment");
-  run_command->add_option("EXPERIMENT", run_options.experiment, "experiment file (YAML)")->required();
+  run_command->add_option("EXPERIMENT", run_options.experiment, "experiment file (YAML), or a sweep's folder to go on")
+      ->required();
   run_command->add_option("--out", run_options.out, "folder of the results; default out/NAME");
   run_command->add_option("--trials", run_options.trials, "trials of each cell");
-  run_command->add_option("--jobs", run_options.jobs, "threads; default one a processor")->check(CLI::PositiveNumber);
-  run_command->add_flag("--fresh", run_options.fresh, "discard results of another configuration");
+  run_command->add_option("--jobs", run_options.jobs, "workers; default one a processor")->check(CLI::PositiveNumber);
+  run_command->add_option("--launcher", run_options.launcher, "processes (default), threads or slurm")
+      ->transform(CLI::CheckedTransformer(words<Launcher>(kLauncherNames)));
+  std::string shard;
+  run_command->add_option("--shard", shard, "run only shard I of M (0 <= I < M), to be merged")
+      ->type_name("I/M")
+      ->check([](const std::string& text) { return parse_shard(text) ? "" : "must be I/M with 0 <= I < M"; });
+  const auto add_slurm = [](CLI::App* command, RunOptions& options) {
+    command->add_option("--partition", options.partition, "of Slurm");
+    command->add_option("--shards", options.shards, "of Slurm, at most; each is at least 30 s of work")
+        ->check(CLI::PositiveNumber);
+  };
+  add_slurm(run_command, run_options);
+  run_command->add_flag("--fresh", run_options.fresh, "discard what the folder holds");
   run_command->add_flag("--json", run_options.json, "print the summary as JSON");
   add_set(run_command, run_options.set);
   add_only(run_command, run_options.only);
@@ -125,11 +153,32 @@ int parse_and_run(int argc, const char* const* argv) {
       ->transform(CLI::CheckedTransformer(words<ResultsFormat>(kResultsFormatNames)));
   export_command->add_option("--out", export_options.out, "the file, which is replaced")->required();
 
+  StatusOptions status_options;
+  CLI::App* status_command = app.add_subcommand("status", "what of a sweep is done, failed and missing");
+  status_command->add_option("OUT", status_options.out, "folder of the sweep")->required();
+  status_command->add_flag("--json", status_options.json, "print JSON");
+
+  MergeOptions merge_options;
+  CLI::App* merge_command = app.add_subcommand("merge", "join the shards of a sweep");
+  merge_command->add_option("OUT", merge_options.out, "folder of the sweep")->required();
+  merge_command->add_flag("--wait", merge_options.wait, "until no other program writes to the folder");
+  merge_command->add_flag("--json", merge_options.json, "print the summary as JSON");
+
+  RunOptions resubmit_options;
+  resubmit_options.launcher = Launcher::kSlurm;
+  CLI::App* resubmit_command = app.add_subcommand("resubmit", "send to Slurm what is missing of a sweep");
+  resubmit_command->add_option("OUT", resubmit_options.experiment, "folder of the sweep")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  add_slurm(resubmit_command, resubmit_options);
+
   ReplayOptions replay_options;
-  CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a finished experiment again");
-  replay_command->add_option("OUT_DIR", replay_options.results, "folder of the results")->required();
-  replay_command->add_option("RUN_ID", replay_options.run_id, "as in results.jsonl")->required();
-  replay_command->add_option("--out", replay_options.out, "write dataset, estimate and series there");
+  CLI::App* replay_command = app.add_subcommand("replay", "run one trial of a sweep again and compare its row");
+  replay_command->add_option("OUT", replay_options.results, "folder of the sweep")->required();
+  replay_command->add_option("RUN", replay_options.run, "CELL TRIAL, or RUN_ID, as in results.jsonl")
+      ->required()
+      ->expected(1, 2);
+  replay_command->add_option("--dump,--out", replay_options.dump, "write dataset, estimate and series there");
 
   BaOptions ba_options;
   CLI::App* ba_command = app.add_subcommand("ba", "adjust a bundle: a problem file of BAL");
@@ -175,8 +224,12 @@ int parse_and_run(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitOk : kExitBadInput;
   }
+  run_options.shard = parse_shard(shard);
   if (*run_command) return run(run_options);
   if (*plan_command) return plan(plan_options);
+  if (*resubmit_command) return run(resubmit_options);
+  if (*status_command) return status(status_options);
+  if (*merge_command) return merge(merge_options);
   if (*simulate_command) return simulate(simulate_options);
   if (*estimate_command) return estimate(estimate_options);
   if (*evaluate_command) return evaluate(evaluate_options);
@@ -192,6 +245,7 @@ int parse_and_run(int argc, const char* const* argv) {
 
 int program(int argc, const char* const* argv) {
   if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
+  if (omp_set_max_active_levels != nullptr) omp_set_max_active_levels(0);
   // Ceres warns of every step that it rejects; what matters comes back as a status.
   FLAGS_minloglevel = google::GLOG_FATAL;
   try {

@@ -3,75 +3,48 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <optional>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "eval/progress.h"
-#include "eval/result_store.h"
 #include "eval/runner.h"
-#include "eval/summary.h"
-#include "eval/summary_table.h"
-#include "tools/commands.h"
-#include "tools/experiment.h"
-#include "tools/run_trial.h"
-#include "tools/version.h"
+#include "eval/series.h"
+#include "recorder.h"
+#include "tools/folder_lock.h"
+#include "tools/sweep.h"
 
 namespace plumbline::tools {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// Set by Ctrl-C: the trials under way are finished, no further one is begun.
+// Set by Ctrl-C: the trials under way are finished, no further one is begun. A second one ends the program.
 std::atomic<bool> cancelled{false};
 void cancel(int) { cancelled = true; }
 
-// What one trial gives to the files.
-struct Finished {
-  eval::Row row;
-  std::string series;  // JSON, empty where the trial failed
-  TrialTimings timings;
-};
-
-eval::Row identity(const Plan& plan, int index) {
-  const int trials = plan.base.experiment.trials;
-  eval::Row row;
-  row.cell = index / trials;
-  row.trial = index % trials;
-  row.seed = plan.base.experiment.seed;
-  row.run_id = run_id(plan.cells[static_cast<std::size_t>(row.cell)], row.trial);
-  return row;
-}
-
-Finished run_one(const Plan& plan, int index) {
-  Finished finished;
-  const eval::Row row = identity(plan, index);
-  const Experiment& experiment = plan.cells[static_cast<std::size_t>(row.cell)].experiment;
-  const core::TrialId id{row.seed, static_cast<std::uint64_t>(row.trial)};
-  const eval::TrialResult result = run_trial(experiment, id, &finished.timings);
-  finished.row = eval::with_result(row, result);
-  if (result.ok) finished.series = eval::to_json(result.series).dump() + "\n";
-  return finished;
-}
-
-// Mean CPU seconds a trial.
-ordered_json runtime_summary(const TrialTimings& sum, int n) {
-  const double per = n > 0 ? 1.0 / n : 0.0;
-  return {
-      {"simulate_s", sum.simulate_s * per}, {"estimate_s", sum.estimate_s * per}, {"evaluate_s", sum.evaluate_s * per}};
+void finish_trials_on_signals() {
+  cancelled = false;
+  struct sigaction action{};
+  action.sa_handler = cancel;
+  action.sa_flags = SA_RESETHAND;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
 }
 
 // A folder may hold results of the same configuration with at most as many trials; all else would be lost.
-void refuse_to_lose(const std::filesystem::path& out, const Plan& plan, bool fresh) {
+void refuse_to_lose(const fs::path& out, const Plan& plan, bool fresh) {
   core::require_no_file_above(out);
-  const std::filesystem::path manifest = out / "manifest.json";
-  if (std::filesystem::exists(out) && !std::filesystem::is_directory(out)) {
+  const fs::path manifest = out / "manifest.json";
+  if (fs::exists(out) && !fs::is_directory(out)) {
     throw core::DataError(fmt::format("{}: exists and is not a folder", out.generic_string()));
   }
-  if (fresh || !std::filesystem::exists(manifest)) return;
+  if (fresh || !fs::exists(manifest)) return;
   const ordered_json old = ordered_json::parse(std::ifstream(manifest), nullptr, false);
   const bool same = old.is_object() && old.value("config_hash", "") == plan.config_hash;
   if (!same) {
@@ -85,117 +58,162 @@ void refuse_to_lose(const std::filesystem::path& out, const Plan& plan, bool fre
   }
 }
 
-std::ofstream open_lines(const std::filesystem::path& path) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  if (!file) throw std::system_error(errno, std::generic_category(), path.generic_string());
-  return file;
+void discard(const fs::path& out) {
+  for (const char* name : {"results.jsonl", "timings.jsonl", "incidents.jsonl", "summary.json", "manifest.json"}) {
+    fs::remove(out / name);
+  }
+  fs::remove_all(out / "series");
+  for (const auto& entry : fs::directory_iterator(out / "shards")) {
+    if (entry.path().filename() != "lock") fs::remove(entry.path());
+  }
 }
 
-ordered_json summarise_results(const Plan& plan, const std::filesystem::path& out, const TrialTimings& timings,
-                               std::vector<eval::CellSummary>& cells) {
-  std::vector<std::vector<eval::Row>> rows(plan.cells.size());
-  eval::for_each_row(out / "results.jsonl", eval::Tail::kWhole,
-                     [&](const eval::Row& row) { rows[static_cast<std::size_t>(row.cell)].push_back(row); });
-  ordered_json json_cells = ordered_json::array();
-  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
-    const bool robust = plan.cells[i].experiment.estimator.loss != estimator::RobustLoss::kNone;
-    cells.push_back(eval::summarise(rows[i], plan.cells[i].axes, robust ? "the estimator has a robust loss" : ""));
-    json_cells.push_back(eval::to_json(cells.back()));
+// The manifest is the plan's alone, so that it changes only where trials are added.
+void write_manifest(const fs::path& out, const Plan& plan) {
+  const fs::path file = out / "manifest.json";
+  const ordered_json manifest = to_manifest(plan);
+  if (fs::exists(file) && ordered_json::parse(std::ifstream(file), nullptr, false) == manifest) return;
+  core::write_file_atomically(file, manifest.dump(2) + "\n");
+}
+
+Plan plan_of(const RunOptions& options) {
+  if (fs::is_directory(options.experiment)) {
+    if (options.trials || !options.set.empty() || !options.only.empty() || options.fresh) {
+      throw core::DataError(
+          fmt::format("{}: --trials, --set, --only and --fresh need the experiment's file, not its folder",
+                      options.experiment.generic_string()));
+    }
+    return read_manifest(options.experiment / "manifest.json");
   }
-  return {{"experiment", plan.base.experiment.name},
-          {"git", commit()},
-          {"config_hash", plan.config_hash},
-          {"error", eval::kErrorDefinition},
-          {"cells", json_cells},
-          {"runtime_s", runtime_summary(timings, plan.runs())}};
+  std::vector<std::string> overrides = options.set;
+  if (options.trials) overrides.push_back(fmt::format("experiment.trials={}", *options.trials));
+  return load_plan(options.experiment, overrides, options.only);
+}
+
+fs::path folder_of(const RunOptions& options, const Plan& plan) {
+  if (options.out) return *options.out;
+  return fs::is_directory(options.experiment) ? options.experiment : fs::path("out") / plan.base.experiment.name;
+}
+
+// Whether all runs have ended, be it by an incident.
+bool run_trials(const Plan& plan, const fs::path& out, const SweepState& state, const std::vector<int>& indices,
+                const RunOptions& options, Journal& journal, const TrialFunction& trial) {
+  finish_trials_on_signals();
+  Recorder recorder(plan, out, journal, state);
+  const eval::TrialRun runs{
+      .trial = [&](int index) { return to_answer(run_one(plan, index, trial)); },
+      .sink = [&](const eval::TrialEnd& end) { recorder.add(end); },
+      .jobs = options.jobs > 0 ? options.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency())),
+      .cpu_limit_s = plan.base.experiment.cpu_limit_s,
+      .cancel = &cancelled};
+  (options.launcher == Launcher::kThreads ? eval::run_in_threads : eval::run_in_processes)(indices, runs);
+  const int done = recorder.counts().done - recorder.counts().before;
+  if (done == static_cast<int>(indices.size())) return true;
+  fmt::print(stderr, "plumbline: interrupted with {} of {} runs done; to go on: plumbline run {}\n",
+             recorder.counts().done, plan.runs(), out.generic_string());
+  return false;
+}
+
+int run_shard(const Plan& plan, const fs::path& out, const RunOptions& options, const TrialFunction& trial) {
+  const Shard shard = *options.shard;
+  const auto belongs = [&](int index) { return index % shard.of == shard.index; };
+  SweepState state = read_state(plan, out);
+  require_sound(state);
+  std::vector<int> indices = state.incomplete();
+  std::erase_if(indices, [&](int index) { return !belongs(index); });
+  Journal journal(out, fmt::format("journal-{}", shard.index));
+  if (!run_trials(plan, out, state, indices, options, journal, trial)) return kExitInternal;
+  state = read_state(plan, out);
+  const fs::path file = out / "shards" / fmt::format("shard-{}.jsonl", shard.index);
+  publish_shard(state, journal, file, belongs);
+  const std::vector<int> left = state.incomplete();
+  const bool complete = std::none_of(left.begin(), left.end(), belongs);
+  fmt::print(stderr, "plumbline: shard {} of {} is {}: {}\n", shard.index, shard.of,
+             complete ? "complete" : "done but for incidents", file.generic_string());
+  return complete ? kExitOk : kExitInternal;
+}
+
+// Of the runs so far, from some of them; nothing where there are none.
+std::optional<double> mean_trial_s(const SweepState& state) {
+  constexpr int kEnough = 100;
+  double sum_s = 0.0;
+  int n = 0;
+  for (const RunState& run : state.runs) {
+    if (!run.timings || n == kEnough) continue;
+    const ordered_json t = ordered_json::parse(state.read(run.timings));
+    for (const char* part : {"simulate_s", "estimate_s", "evaluate_s"}) sum_s += t.at(part).get<double>();
+    ++n;
+  }
+  return n > 0 ? std::optional(sum_s / n) : std::nullopt;
+}
+
+// One run is made here where none tells yet how long they take.
+int run_on_cluster(const Plan& plan, const fs::path& out, const RunOptions& options, SweepState state,
+                   const TrialFunction& trial) {
+  const std::vector<int> indices = state.incomplete();
+  if (indices.empty()) {
+    fmt::print(stderr, "plumbline: no run is missing; to join the shards: plumbline merge {}\n", out.generic_string());
+    return kExitOk;
+  }
+  if (!mean_trial_s(state)) {
+    RunOptions here = options;
+    here.launcher = Launcher::kProcesses;
+    Journal journal(out, "probe");
+    if (!run_trials(plan, out, state, {indices.front()}, here, journal, trial)) return kExitInternal;
+    state = read_state(plan, out);
+  }
+  return submit(plan, out, options, state, mean_trial_s(state).value_or(0.0));
 }
 
 }  // namespace
 
-int run(const RunOptions& options) {
-  std::vector<std::string> overrides = options.set;
-  if (options.trials) overrides.push_back(fmt::format("experiment.trials={}", *options.trials));
-  const Plan plan = load_plan(options.experiment, overrides, options.only);
-  const std::filesystem::path out = options.out.value_or(std::filesystem::path("out") / plan.base.experiment.name);
+Finished run_one(const Plan& plan, int index, const TrialFunction& trial) {
+  Finished finished{.row = identity(plan, index), .series = {}, .timings = {}};
+  const Experiment& experiment = plan.cells[static_cast<std::size_t>(finished.row.cell)].experiment;
+  const core::TrialId id{finished.row.seed, static_cast<std::uint64_t>(finished.row.trial)};
+  const eval::TrialResult result = trial(experiment, id, &finished.timings);
+  finished.row = eval::with_result(finished.row, result);
+  if (result.ok) finished.series = eval::to_json(result.series).dump() + "\n";
+  return finished;
+}
+
+eval::Row failed_row(const Plan& plan, int index, const eval::TrialEnd& end) {
+  eval::TrialResult result;
+  result.status = end.outcome == eval::Outcome::kCrash ? "crash" : "exception";
+  result.reason = end.text;
+  return eval::with_result(identity(plan, index), result);
+}
+
+int run(const RunOptions& options) { return run(options, run_trial); }
+
+int run(const RunOptions& options, const TrialFunction& trial) {
+  const Plan plan = plan_of(options);
+  const fs::path out = folder_of(options, plan);
   refuse_to_lose(out, plan, options.fresh);
-  std::filesystem::create_directories(out);
-  if (options.fresh) std::filesystem::remove_all(out / "series");
-  std::filesystem::create_directories(out / "series");
-  core::write_file_atomically(out / "manifest.json", to_manifest(plan).dump(2) + "\n");
+  if (options.fresh) {
+    const FolderLock alone(out, LockKind::kAlone);
+    discard(out);
+  }
+  const bool side_by_side = options.shard || options.launcher == Launcher::kSlurm;
+  const FolderLock lock(out, side_by_side ? LockKind::kShared : LockKind::kAlone);
+  fs::create_directories(out / "series");
+  write_manifest(out, plan);
+  if (options.shard) return run_shard(plan, out, options, trial);
 
-  cancelled = false;
-  std::signal(SIGINT, cancel);
-  std::signal(SIGTERM, cancel);
-  const int jobs = options.jobs > 0 ? options.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  eval::ResultWriter results(out / "results.jsonl");
-  std::ofstream timings_file = open_lines(out / "timings.jsonl");
-  std::ofstream incidents_file = open_lines(out / "incidents.jsonl");
-  TrialTimings timings_sum;
-  int written = 0;
-  int failed = 0;
-  int incidents = 0;
-  int done = 0;
+  SweepState state = read_state(plan, out);
+  require_sound(state);
+  const std::vector<int> indices = state.incomplete();
+  if (indices.empty() && !state.has_journals() && fs::exists(out / "summary.json")) {
+    fmt::print(stderr, "plumbline: nothing to do, all {} runs are in {}\n", plan.runs(), out.generic_string());
+    return conclude(plan, out, options.json);
+  }
+  if (options.launcher == Launcher::kSlurm) return run_on_cluster(plan, out, options, std::move(state), trial);
   {
-    eval::Progress progress(stderr, plan.runs());
-    const eval::TrialHandlers<Finished> handlers{
-        .sink =
-            [&](int, const Finished& finished) {
-              // Rows follow each other without a gap, also where an incident left one out.
-              results.add(written++, finished.row);
-              if (!finished.series.empty()) {
-                core::write_file_atomically(out / "series" / (finished.row.run_id + ".json"), finished.series);
-              }
-              const TrialTimings& t = finished.timings;
-              timings_file << ordered_json{{"run_id", finished.row.run_id},
-                                           {"simulate_s", t.simulate_s},
-                                           {"estimate_s", t.estimate_s},
-                                           {"evaluate_s", t.evaluate_s}}
-                                  .dump()
-                           << '\n';
-              timings_sum.simulate_s += t.simulate_s;
-              timings_sum.estimate_s += t.estimate_s;
-              timings_sum.evaluate_s += t.evaluate_s;
-              failed += finished.row.ok ? 0 : 1;
-              progress.add(finished.row.ok);
-            },
-        .failed_row =
-            [&](int index, const std::exception& error) {
-              eval::TrialResult result;
-              result.status = "exception";
-              result.reason = error.what();
-              return Finished{.row = eval::with_result(identity(plan, index), result), .series = {}, .timings = {}};
-            },
-        .incident =
-            [&](int index) {
-              ++incidents;
-              incidents_file
-                  << ordered_json{{"run_id", identity(plan, index).run_id}, {"cause", "out of memory"}}.dump() << '\n';
-              progress.add(false);
-            }};
-    done = eval::run_trials<Finished>(
-        plan.runs(), jobs, [&](int index) { return run_one(plan, index); }, handlers, &cancelled);
+    Journal journal(out, "journal");
+    if (!run_trials(plan, out, state, indices, options, journal, trial)) return kExitInternal;
   }
-  if (done < plan.runs()) {
-    fmt::print(stderr, "plumbline: interrupted after {} of {} runs; they are in {}\n", done, plan.runs(),
-               (out / "results.jsonl.tmp").generic_string());
-    return kExitInternal;
-  }
-  results.finish();
-
-  std::vector<eval::CellSummary> cells;
-  const ordered_json summary = summarise_results(plan, out, timings_sum, cells);
-  core::write_file_atomically(out / "summary.json", summary.dump(2) + "\n");
-  if (options.json) {
-    fmt::print("{}\n", summary.dump(2));
-  } else {
-    fmt::print("{}\nresults: {}\n", eval::summary_table(cells), out.generic_string());
-  }
-  if (incidents > 0) {
-    fmt::print(stderr, "plumbline: {} runs were lost to the machine, see {}\n", incidents,
-               (out / "incidents.jsonl").generic_string());
-    return kExitInternal;
-  }
-  return failed > plan.base.experiment.max_failed_share * plan.runs() ? kExitWorse : kExitOk;
+  publish(read_state(plan, out), out);
+  return conclude(plan, out, options.json);
 }
 
 }  // namespace plumbline::tools

@@ -7,6 +7,10 @@
 #include "eval/metric_bound.h"
 #include "sim/simulate.h"
 
+// Of OpenMP. CHOLMOD asks for four threads whatever their number is set to; no level of parallel regions leaves it one.
+// It counts for the thread that calls it.
+extern "C" void omp_set_max_active_levels(int) __attribute__((weak));
+
 namespace plumbline::tools {
 namespace {
 
@@ -71,6 +75,7 @@ void add_bound(const Experiment& experiment, const core::MeasurementLog& measure
 }  // namespace
 
 eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, TrialTimings* timings) {
+  if (omp_set_max_active_levels != nullptr) omp_set_max_active_levels(0);
   ThreadClock clock;
   TrialTimings t;
   const auto [measurements, truth] = sim::simulate(experiment.scenario, trial);

@@ -9,10 +9,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <map>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -51,24 +48,5 @@ enum class Tail {
 // Calls `use` for each row in turn, so that a file of any length passes through. Throws core::DataError
 // `file:line: rule`, also for a file that is missing.
 void for_each_row(const std::filesystem::path& path, Tail tail, const std::function<void(const Row&)>& use);
-
-// Writes rows that come in any order, from any thread, in the order of their indices 0, 1, 2, ..., each as soon as all
-// before it are there. Until finish() the file is PATH.tmp, always a prefix of the result (Tail::kMayTear reads it).
-class ResultWriter {
- public:
-  explicit ResultWriter(std::filesystem::path path);  // PATH.tmp is begun anew
-
-  void add(int index, const Row& row);  // each index once
-
-  // Syncs and renames PATH.tmp to PATH. Throws std::logic_error where rows still wait for one that never came.
-  void finish();
-
- private:
-  std::filesystem::path path_;
-  std::mutex mutex_;
-  std::ofstream file_;
-  int next_ = 0;
-  std::map<int, std::string> waiting_;
-};
 
 }  // namespace plumbline::eval

@@ -21,15 +21,28 @@ inline constexpr int kExitWorse = 1;
 inline constexpr int kExitBadInput = 2;
 inline constexpr int kExitInternal = 3;
 
+enum class Launcher { kProcesses, kThreads, kSlurm };
+inline constexpr std::array<std::string_view, 3> kLauncherNames = {"processes", "threads", "slurm"};
+
+// The runs whose number leaves `index` when divided by `of`.
+struct Shard {
+  int index = 0;
+  int of = 1;
+};
+
 struct RunOptions {
-  std::filesystem::path experiment;
+  std::filesystem::path experiment;          // the file, or the folder of a planned sweep
   std::optional<std::filesystem::path> out;  // out/<experiment.name>
   std::optional<int> trials;
   int jobs = 0;  // 0: one a processor
   std::vector<std::string> set;
   std::vector<std::string> only;  // KEY=VALUE of an axis: these cells alone
-  bool fresh = false;             // discard results of another configuration
+  bool fresh = false;             // discard what the folder holds
   bool json = false;
+  Launcher launcher = Launcher::kProcesses;
+  std::optional<Shard> shard;  // this one alone, to be merged
+  std::string partition;       // of Slurm; its default where empty
+  std::optional<int> shards;   // of Slurm, at most
 };
 int run(const RunOptions& options);
 
@@ -43,6 +56,19 @@ struct PlanOptions {
   int jobs = 0;          // of that estimate; 0: one a processor
 };
 int plan(const PlanOptions& options);
+
+struct StatusOptions {
+  std::filesystem::path out;
+  bool json = false;
+};
+int status(const StatusOptions& options);
+
+struct MergeOptions {
+  std::filesystem::path out;
+  bool json = false;
+  bool wait = false;  // until no one else writes to the folder
+};
+int merge(const MergeOptions& options);  // kExitInternal where runs are missing
 
 struct SimulateOptions {
   std::filesystem::path scenario;
@@ -93,11 +119,11 @@ struct ExportResultsOptions {
 int export_results(const ExportResultsOptions& options);
 
 struct ReplayOptions {
-  std::filesystem::path results;  // the folder of a run
-  std::string run_id;
-  std::optional<std::filesystem::path> out;  // writes the dataset, the estimate and the series
+  std::filesystem::path results;              // the folder of a sweep
+  std::vector<std::string> run;               // its id, or its cell and trial
+  std::optional<std::filesystem::path> dump;  // writes the dataset, the estimate and the series
 };
-int replay(const ReplayOptions& options);
+int replay(const ReplayOptions& options);  // kExitInternal where the row or the series is not the stored one
 
 struct CheckOptions {
   std::vector<std::filesystem::path> files;

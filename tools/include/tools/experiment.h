@@ -36,6 +36,7 @@ struct ExperimentConfig {
   int trials = 1;
   std::uint64_t seed = 1;
   double max_failed_share = 0.0;
+  double cpu_limit_s = 3600.0;
 };
 void visit(core::ConfigVisitor& v, ExperimentConfig& c);
 
