@@ -60,10 +60,8 @@ scenario:
   imu: {gyro_noise_density_rad_s_sqrt_hz: 1.7e-4, gyro_bias_walk_rad_s2_sqrt_hz: 2.0e-5,
         accel_noise_density_m_s2_sqrt_hz: 2.0e-3, accel_bias_walk_m_s3_sqrt_hz: 3.0e-3}
   camera: {readout_s: 0.03}
-  world: {landmarks: 300}
-  points: {per_frame: 15}
-estimator: {keyframe_rate_hz: 5, max_iterations: 20}
-eval: {alignment: none}
+  world: {landmarks: 500}
+  points: {per_frame: 20}
 )");
   }
 
