@@ -92,7 +92,7 @@ sim::ScenarioConfig line_rooms() {
   c.world.landmarks = 6000;
   c.world.lines.windows.spacing_m = 2.0;
   c.world.lines.random = 800;
-  c.lines.per_frame = 40;
+  c.lines.per_frame = 42;  // 40 on average: some frames see fewer
   c.lines.slide_sigma_px = 3.0;
   c.lines.fragment_probability = 0.01;
   c.lines.merge_probability = 0.1;
