@@ -114,8 +114,8 @@ bool run_trials(const Plan& plan, const fs::path& out, const SweepState& state, 
   return false;
 }
 
-int run_shard(const Plan& plan, const fs::path& out, const RunOptions& options, const TrialFunction& trial) {
-  const Shard shard = *options.shard;
+int run_shard(const Plan& plan, const fs::path& out, Shard shard, const RunOptions& options,
+              const TrialFunction& trial) {
   const auto belongs = [&](int index) { return index % shard.of == shard.index; };
   SweepState state = read_state(plan, out);
   require_sound(state);
@@ -198,7 +198,7 @@ int run(const RunOptions& options, const TrialFunction& trial) {
   const FolderLock lock(out, side_by_side ? LockKind::kShared : LockKind::kAlone);
   fs::create_directories(out / "series");
   write_manifest(out, plan);
-  if (options.shard) return run_shard(plan, out, options, trial);
+  if (options.shard) return run_shard(plan, out, *options.shard, options, trial);
 
   SweepState state = read_state(plan, out);
   require_sound(state);
