@@ -142,7 +142,7 @@ TEST_F(CommandLine, RunGivesTheCramerRaoBound) {
   ASSERT_EQ(global.code, 0) << global.err;
   const auto with_global = nlohmann::json::parse(global.out)["cells"][0]["metrics"];
   EXPECT_TRUE(with_global["td_error_s"].contains("crlb"));
-  for (const char* name : {"readout_error_s", "td_first_row_error_s", "calibration"}) {
+  for (const char* name : {"readout_error_s", "td_first_error_s", "calibration"}) {
     EXPECT_FALSE(with_global[name].contains("crlb")) << name;
   }
 

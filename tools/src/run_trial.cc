@@ -43,7 +43,7 @@ void withhold_claims(const Experiment& experiment, std::vector<eval::Metric>& me
   for (eval::Metric& metric : metrics) {
     const bool of_both = metric.name == "calibration" || metric.name == "joint";
     const bool of_td = of_both || metric.name.starts_with("td_");
-    const bool of_readout = of_both || metric.name.starts_with("readout_") || metric.name == "td_first_row_error_s";
+    const bool of_readout = of_both || metric.name.starts_with("readout_") || metric.name == "td_first_error_s";
     const bool no_room = exact || (prior.td_mean_s && of_td) || (prior.readout_mean_s && of_readout);
     if (robust || no_room) {
       metric.nees.reset();
