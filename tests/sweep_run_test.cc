@@ -60,8 +60,9 @@ scenario:
   imu: {gyro_noise_density_rad_s_sqrt_hz: 1.7e-4, gyro_bias_walk_rad_s2_sqrt_hz: 2.0e-5,
         accel_noise_density_m_s2_sqrt_hz: 2.0e-3, accel_bias_walk_m_s3_sqrt_hz: 3.0e-3}
   camera: {readout_s: 0.03}
-  world: {landmarks: 500}
-  points: {per_frame: 20}
+  world: {landmarks: 200}
+  points: {per_frame: 10}
+estimator: {keyframe_rate_hz: 5}
 )");
   }
 
