@@ -45,6 +45,7 @@ void run_in_threads(const std::vector<int>& indices, const TrialRun& run) {
   {
     std::vector<std::jthread> threads;
     const std::size_t count = std::min(indices.size(), static_cast<std::size_t>(run.jobs));
+    threads.reserve(count);
     for (std::size_t i = 0; i < count; ++i) threads.emplace_back(work);
   }
   if (failure) std::rethrow_exception(failure);

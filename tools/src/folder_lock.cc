@@ -41,8 +41,9 @@ FolderLock::FolderLock(const fs::path& out, LockKind kind, bool wait) {
   lock.l_type = kind == LockKind::kAlone ? F_WRLCK : F_RDLCK;
   lock.l_whence = SEEK_SET;
   int locked = -1;
-  do locked = ::fcntl(file_, wait ? F_SETLKW : F_SETLK, &lock);
-  while (locked != 0 && errno == EINTR);
+  do {
+    locked = ::fcntl(file_, wait ? F_SETLKW : F_SETLK, &lock);
+  } while (locked != 0 && errno == EINTR);
   if (locked != 0) {
     const int error = errno;
     ::close(file_);

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMostShards = 1000;  // MaxArraySize of a Slurm that was not configured otherwise is 1001
-constexpr double kLeastShard_s = 30.0;
+constexpr double kLeastShardS = 30.0;
 
 // As one word of a shell's line.
 std::string shell_word(std::string_view text) {
@@ -49,13 +49,13 @@ std::string sbatch(const std::vector<std::string>& arguments) {
   return answer;
 }
 
-// As few as hold kLeastShard_s of work each, at most as many as asked for. The number of an earlier submission stays,
+// As few as hold kLeastShardS of work each, at most as many as asked for. The number of an earlier submission stays,
 // so that a shard that is sent again finds what it has done.
 int number_of_shards(const fs::path& out, double work_s, const std::optional<int>& asked) {
   int earlier = 0;
   if (!asked && std::ifstream(out / "slurm" / "shards") >> earlier && earlier > 0) return earlier;
   const double most = std::min<double>(asked.value_or(kMostShards), kMostShards);
-  return static_cast<int>(std::clamp(work_s / kLeastShard_s, 1.0, most));
+  return static_cast<int>(std::clamp(work_s / kLeastShardS, 1.0, most));
 }
 
 }  // namespace
