@@ -34,8 +34,8 @@ std::map<std::string, T> words(const auto& names) {
 // I/M with 0 <= I < M.
 std::optional<Shard> parse_shard(std::string_view text) {
   Shard shard;
-  const char* const end = text.data() + text.size();
-  const auto [slash, error] = std::from_chars(text.data(), end, shard.index);
+  const char* const end = text.end();
+  const auto [slash, error] = std::from_chars(text.begin(), end, shard.index);
   if (error != std::errc() || slash == end || *slash != '/') return std::nullopt;
   const auto [last, error_of] = std::from_chars(slash + 1, end, shard.of);
   if (error_of != std::errc() || last != end || shard.index < 0 || shard.index >= shard.of) return std::nullopt;
