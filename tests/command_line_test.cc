@@ -143,7 +143,7 @@ TEST_F(CommandLine, RunGivesTheCramerRaoBound) {
   const auto with_global = nlohmann::json::parse(global.out)["cells"][0]["metrics"];
   EXPECT_TRUE(with_global["td_error_s"].contains("crlb"));
   for (const char* name : {"readout_error_s", "td_first_error_s", "calibration"}) {
-    EXPECT_FALSE(with_global[name].contains("crlb")) << name;
+    EXPECT_FALSE(with_global.at(name).contains("crlb")) << name;
   }
 
   const Result noiseless = plumbline(bound +

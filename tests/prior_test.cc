@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -136,32 +138,28 @@ TEST(Prior, StartIsTheMeanUnlessDrawn) {
   EXPECT_GT((error_of(drawn.start, drawn.start_calibration, truth) - mean).cwiseAbs().minCoeff(), 0.0);
 }
 
-TEST(Prior, FixedTimeOffsetLeavesTheOtherDraws) {
+// Of td and the readout, each alone.
+TEST(Prior, AFixedMeanLeavesTheOtherDraws) {
   const GroundTruth truth = some_truth();
-  ScenarioConfig config = some_config();
-  const core::InitialPrior drawn = make_prior(truth, config, {.seed = 1, .trial = 3});
-  config.prior.td_mean_s = 0.1;
-  const core::InitialPrior fixed = make_prior(truth, config, {.seed = 1, .trial = 3});
-  EXPECT_EQ(fixed.calibration.td_s, 0.1);
-  EXPECT_EQ(fixed.start_calibration.td_s, 0.1);
-  EXPECT_EQ(make_prior(truth, config, {.seed = 1, .trial = 4}).calibration.td_s, 0.1);
-  EXPECT_EQ(core::minus(fixed.mean, drawn.mean), core::StateTangent::Zero());
-  EXPECT_EQ(fixed.calibration.readout_s, drawn.calibration.readout_s);
-  EXPECT_EQ(fixed.calibration.T_B_C.p, drawn.calibration.T_B_C.p);
-  EXPECT_EQ(fixed.calibration.T_B_C.q.coeffs(), drawn.calibration.T_B_C.q.coeffs());
-}
-
-TEST(Prior, FixedReadoutLeavesTheOtherDraws) {
-  const GroundTruth truth = some_truth();
-  ScenarioConfig config = some_config();
-  const core::InitialPrior drawn = make_prior(truth, config, {.seed = 1, .trial = 3});
-  config.prior.readout_mean_s = 0.0;
-  const core::InitialPrior fixed = make_prior(truth, config, {.seed = 1, .trial = 3});
-  EXPECT_NE(drawn.calibration.readout_s, 0.0);
-  EXPECT_EQ(fixed.calibration.readout_s, 0.0);
-  EXPECT_EQ(fixed.start_calibration.readout_s, 0.0);
-  EXPECT_EQ(fixed.calibration.td_s, drawn.calibration.td_s);
-  EXPECT_EQ(fixed.calibration.T_B_C.p, drawn.calibration.T_B_C.p);
+  const core::InitialPrior drawn = make_prior(truth, some_config(), {.seed = 1, .trial = 3});
+  using Mean = std::optional<double> PriorConfig::*;
+  using Value = double core::RigCalibration::*;
+  for (const auto& [mean, value, other] :
+       {std::tuple<Mean, Value, Value>{&PriorConfig::td_mean_s, &core::RigCalibration::td_s,
+                                       &core::RigCalibration::readout_s},
+        {&PriorConfig::readout_mean_s, &core::RigCalibration::readout_s, &core::RigCalibration::td_s}}) {
+    ScenarioConfig config = some_config();
+    config.prior.*mean = 0.1;
+    const core::InitialPrior fixed = make_prior(truth, config, {.seed = 1, .trial = 3});
+    EXPECT_NE(drawn.calibration.*value, 0.1);
+    EXPECT_EQ(fixed.calibration.*value, 0.1);
+    EXPECT_EQ(fixed.start_calibration.*value, 0.1);
+    EXPECT_EQ(make_prior(truth, config, {.seed = 1, .trial = 4}).calibration.*value, 0.1);
+    EXPECT_EQ(core::minus(fixed.mean, drawn.mean), core::StateTangent::Zero());
+    EXPECT_EQ(fixed.calibration.*other, drawn.calibration.*other);
+    EXPECT_EQ(fixed.calibration.T_B_C.p, drawn.calibration.T_B_C.p);
+    EXPECT_EQ(fixed.calibration.T_B_C.q.coeffs(), drawn.calibration.T_B_C.q.coeffs());
+  }
 }
 
 }  // namespace

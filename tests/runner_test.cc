@@ -317,15 +317,14 @@ TEST(ResultStore, RefusesWhatItDidNotWrite) {
             "f:9: solver: final_cost: wrong type or out of range");
 }
 
-TEST(ResultStore, ATornLastLineIsLeftOutOnlyWhereAsked) {
+TEST(ResultStore, ATornLastLineIsRefused) {
   const fs::path path = scratch("results.jsonl.tmp");
   const std::string two = to_line(make_row(0)) + "\n" + to_line(make_row(1)) + "\n";
   std::ofstream(path, std::ios::binary) << two << to_line(make_row(2)).substr(0, 40);
   int count = 0;
-  for_each_row(path, Tail::kMayTear, [&](const Row&) { ++count; });
+  EXPECT_THROW(for_each_row(path, [&](const Row&) { ++count; }), core::DataError);
   EXPECT_EQ(count, 2);
-  EXPECT_THROW(for_each_row(path, Tail::kWhole, [](const Row&) {}), core::DataError);
-  EXPECT_THROW(for_each_row(scratch("missing"), Tail::kMayTear, [](const Row&) {}), core::DataError);
+  EXPECT_THROW(for_each_row(scratch("missing"), [](const Row&) {}), core::DataError);
 }
 
 TEST(Progress, TellsWhatIsLeft) {

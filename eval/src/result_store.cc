@@ -156,14 +156,13 @@ Row parse_row(std::string_view line, const std::string& where) {
   return row;
 }
 
-void for_each_row(const std::filesystem::path& path, Tail tail, const std::function<void(const Row&)>& use) {
+void for_each_row(const std::filesystem::path& path, const std::function<void(const Row&)>& use) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw DataError(path.string() + ": no such file, or not readable");
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     const std::string where = fmt::format("{}:{}", path.string(), number);
     if (file.eof()) {  // getline met the end of the file before the end of the line
-      if (tail == Tail::kMayTear) return;
       throw DataError(where + ": the last line is not complete");
     }
     use(parse_row(line, where));

@@ -27,7 +27,7 @@ std::vector<nlohmann::ordered_json> read_cells(const std::filesystem::path& fold
 void for_each_result(const std::filesystem::path& folder, std::size_t cells,
                      const std::function<void(const eval::Row&)>& use) {
   const std::filesystem::path results = folder / "results.jsonl";
-  eval::for_each_row(results, eval::Tail::kWhole, [&](const eval::Row& row) {
+  eval::for_each_row(results, [&](const eval::Row& row) {
     if (static_cast<std::size_t>(row.cell) >= cells) {
       throw core::DataError(fmt::format("{}: run {}: no cell {} in {}", results.generic_string(), row.run_id, row.cell,
                                         (folder / "manifest.json").generic_string()));

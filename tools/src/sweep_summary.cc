@@ -28,7 +28,7 @@ std::vector<eval::CellSummary> summarise_cells(const Plan& plan, const fs::path&
     summaries.push_back(eval::summarise(rows, cell.axes, robust ? "the estimator has a robust loss" : ""));
     rows.clear();
   };
-  eval::for_each_row(out / "results.jsonl", eval::Tail::kWhole, [&](const eval::Row& row) {
+  eval::for_each_row(out / "results.jsonl", [&](const eval::Row& row) {
     while (static_cast<int>(summaries.size()) < row.cell) close_cell();
     rows.push_back(row);
   });

@@ -40,13 +40,8 @@ std::string to_line(const Row& row);
 // Strict: a missing, unknown or mistyped key throws core::DataError `where: rule`.
 Row parse_row(std::string_view line, const std::string& where);
 
-enum class Tail {
-  kWhole,    // every line must be complete
-  kMayTear,  // a last line without its end, of a writer that was killed, is left out
-};
-
 // Calls `use` for each row in turn, so that a file of any length passes through. Throws core::DataError
-// `file:line: rule`, also for a file that is missing.
-void for_each_row(const std::filesystem::path& path, Tail tail, const std::function<void(const Row&)>& use);
+// `file:line: rule`, also for a file that is missing and a last line without its end.
+void for_each_row(const std::filesystem::path& path, const std::function<void(const Row&)>& use);
 
 }  // namespace plumbline::eval
