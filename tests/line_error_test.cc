@@ -37,11 +37,12 @@ struct Trial {
   sim::GroundTruth truth;
 };
 
-// An exact estimate of a circle, with lines: one exact, one 0.2 m off, one of an unknown track, and one not estimated.
+// An exact estimate of a circle, with lines: one exact, one 0.2 m off, one askew and
+// 1 m off at its middle, one of an unknown track, and one not estimated.
 Trial trial() {
   Trial t;
-  t.truth.segments_W = {kSegment, kSegment};
-  t.truth.track_segment = {{4, 0}, {5, 1}};
+  t.truth.segments_W = {kSegment, kSegment, kSegment};
+  t.truth.track_segment = {{4, 0}, {5, 1}, {7, 2}};
   for (int k = 0; k < 50; ++k) {
     const double a = 0.1 * k;
     core::StampedState s{.t_ns = core::to_ns(0.1 * k), .state = {}};
@@ -51,8 +52,8 @@ Trial trial() {
   t.estimate.status = core::SolveStatus::kConverged;
   t.estimate.states = t.truth.states;
   t.estimate.lines = {through({0.0, 2.0, 3.0}, {1.0, 0.0, 0.0}, 4), through({0.0, 2.2, 3.0}, {1.0, 0.0, 0.0}, 5),
-                      through({0.0, 0.0, 9.0}, {0.0, 1.0, 0.0}, 6)};
-  t.estimate.line_tracks = 4;
+                      through({0.0, 0.0, 9.0}, {0.0, 1.0, 0.0}, 6), through({2.0, 3.0, 3.0}, {1.0, 0.0, 1.0}, 7)};
+  t.estimate.line_tracks = 5;
   return t;
 }
 
@@ -64,10 +65,10 @@ const Metric* find(const std::vector<Metric>& metrics, std::string_view name) {
 TEST(LineErrors, AreMediansOverTheLinesWithATruth) {
   const Trial t = trial();
   const LineErrors e = line_errors(t.estimate, t.truth);
-  EXPECT_EQ(e.lines, 2);
-  EXPECT_NEAR(e.distance_m, 0.1, 1e-12);
+  EXPECT_EQ(e.lines, 3);
+  EXPECT_NEAR(e.distance_m, 0.2, 1e-12);
   EXPECT_NEAR(e.angle_deg, 0.0, 1e-12);
-  EXPECT_DOUBLE_EQ(e.share, 0.75);
+  EXPECT_DOUBLE_EQ(e.share, 0.8);
 }
 
 TEST(LineErrors, AreMetricsWhereLinesWereUsed) {
@@ -75,8 +76,8 @@ TEST(LineErrors, AreMetricsWhereLinesWereUsed) {
   const TrialResult with = evaluate(t.estimate, t.truth, {});
   ASSERT_TRUE(with.ok) << with.reason;
   ASSERT_NE(find(with.metrics, kLineDistance), nullptr);
-  EXPECT_NEAR(find(with.metrics, kLineDistance)->value, 0.1, 1e-12);
-  EXPECT_DOUBLE_EQ(find(with.metrics, kLineShare)->value, 0.75);
+  EXPECT_NEAR(find(with.metrics, kLineDistance)->value, 0.2, 1e-12);
+  EXPECT_DOUBLE_EQ(find(with.metrics, kLineShare)->value, 0.8);
 
   t.estimate.lines.clear();
   const TrialResult none = evaluate(t.estimate, t.truth, {});
