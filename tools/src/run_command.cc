@@ -18,6 +18,9 @@
 #include "tools/folder_lock.h"
 #include "tools/sweep.h"
 
+// 0: built without threads. Absent where the BLAS is another.
+extern "C" int openblas_get_parallel(void) __attribute__((weak));
+
 namespace plumbline::tools {
 namespace {
 
@@ -35,6 +38,20 @@ void finish_trials_on_signals() {
   action.sa_flags = SA_RESETHAND;
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+}
+
+int jobs_of(const RunOptions& options) {
+  return options.jobs > 0 ? options.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+// An OpenBLAS that was built without threads does not lock its buffers either: two trials at once spoil each other's
+// numbers, now and then, and nothing tells (docs/decisions/0003-solving-the-batch.md).
+void require_safe_threads(const RunOptions& options) {
+  const bool safe = openblas_get_parallel == nullptr || openblas_get_parallel() != 0;
+  if (options.launcher == Launcher::kThreads && jobs_of(options) > 1 && !safe) {
+    throw core::DataError(
+        "--launcher threads: this OpenBLAS is not safe among threads; install libopenblas0-pthread, or use processes");
+  }
 }
 
 // A folder may hold results of the same configuration with at most as many trials; all else would be lost.
@@ -100,12 +117,11 @@ bool run_trials(const Plan& plan, const fs::path& out, const SweepState& state, 
                 const RunOptions& options, Journal& journal, const TrialFunction& trial) {
   finish_trials_on_signals();
   Recorder recorder(plan, out, journal, state);
-  const eval::TrialRun runs{
-      .trial = [&](int index) { return to_answer(run_one(plan, index, trial)); },
-      .sink = [&](const eval::TrialEnd& end) { recorder.add(end); },
-      .jobs = options.jobs > 0 ? options.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency())),
-      .cpu_limit_s = plan.base.experiment.cpu_limit_s,
-      .cancel = &cancelled};
+  const eval::TrialRun runs{.trial = [&](int index) { return to_answer(run_one(plan, index, trial)); },
+                            .sink = [&](const eval::TrialEnd& end) { recorder.add(end); },
+                            .jobs = jobs_of(options),
+                            .cpu_limit_s = plan.base.experiment.cpu_limit_s,
+                            .cancel = &cancelled};
   (options.launcher == Launcher::kThreads ? eval::run_in_threads : eval::run_in_processes)(indices, runs);
   const int done = recorder.counts().done - recorder.counts().before;
   if (done == static_cast<int>(indices.size())) return true;
@@ -187,6 +203,7 @@ eval::Row failed_row(const Plan& plan, int index, const eval::TrialEnd& end) {
 int run(const RunOptions& options) { return run(options, run_trial); }
 
 int run(const RunOptions& options, const TrialFunction& trial) {
+  require_safe_threads(options);
   const Plan plan = plan_of(options);
   const fs::path out = folder_of(options, plan);
   refuse_to_lose(out, plan, options.fresh);
