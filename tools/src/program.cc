@@ -13,13 +13,9 @@
 
 #include "core/error.h"
 #include "tools/ba_command.h"
+#include "tools/blas.h"
 #include "tools/commands.h"
 #include "tools/version.h"
-
-// Of OpenBLAS, where it is the BLAS in use, and of OpenMP, which CHOLMOD uses: one thread a trial, and the same bytes
-// whatever the number of processors.
-extern "C" void openblas_set_num_threads(int) __attribute__((weak));
-extern "C" void omp_set_max_active_levels(int) __attribute__((weak));
 
 namespace plumbline::tools {
 namespace {
@@ -244,8 +240,7 @@ int parse_and_run(int argc, const char* const* argv) {
 }  // namespace
 
 int program(int argc, const char* const* argv) {
-  if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
-  if (omp_set_max_active_levels != nullptr) omp_set_max_active_levels(0);
+  use_one_blas_thread();
   // Ceres warns of every step that it rejects; what matters comes back as a status.
   FLAGS_minloglevel = google::GLOG_FATAL;
   try {

@@ -11,6 +11,7 @@
 #include "estimator/estimate.h"
 #include "output_folders.h"
 #include "sim/simulate.h"
+#include "tools/blas.h"
 #include "tools/sweep.h"
 
 namespace plumbline::tools {
@@ -94,6 +95,7 @@ std::string replay_command(const fs::path& out, const eval::Row& row) {
 int replay(const ReplayOptions& options) { return replay(options, run_trial); }
 
 int replay(const ReplayOptions& options, const TrialFunction& trial) {
+  use_one_blas_thread();
   if (options.dump) refuse_existing(*options.dump);
   const Plan plan = read_manifest(options.results / "manifest.json");
   const int index = find_run(plan, options);

@@ -15,11 +15,9 @@
 #include "eval/runner.h"
 #include "eval/series.h"
 #include "recorder.h"
+#include "tools/blas.h"
 #include "tools/folder_lock.h"
 #include "tools/sweep.h"
-
-// 0: built without threads. Absent where the BLAS is another.
-extern "C" int openblas_get_parallel(void) __attribute__((weak));
 
 namespace plumbline::tools {
 namespace {
@@ -44,11 +42,8 @@ int jobs_of(const RunOptions& options) {
   return options.jobs > 0 ? options.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-// An OpenBLAS that was built without threads does not lock its buffers either: two trials at once spoil each other's
-// numbers, now and then, and nothing tells (docs/decisions/0003-solving-the-batch.md).
 void require_safe_threads(const RunOptions& options) {
-  const bool safe = openblas_get_parallel == nullptr || openblas_get_parallel() != 0;
-  if (options.launcher == Launcher::kThreads && jobs_of(options) > 1 && !safe) {
+  if (options.launcher == Launcher::kThreads && jobs_of(options) > 1 && !blas_is_thread_safe()) {
     throw core::DataError(
         "--launcher threads: this OpenBLAS is not safe among threads; install libopenblas0-pthread, or use processes");
   }
@@ -204,6 +199,7 @@ int run(const RunOptions& options) { return run(options, run_trial); }
 
 int run(const RunOptions& options, const TrialFunction& trial) {
   require_safe_threads(options);
+  use_one_blas_thread();
   const Plan plan = plan_of(options);
   const fs::path out = folder_of(options, plan);
   refuse_to_lose(out, plan, options.fresh);
