@@ -63,7 +63,7 @@ TEST(EstimateLines, LinesAloneFindTheirMinimum) {
     const sim::Simulation s = sim::simulate(scenario, {.seed = 1, .trial = static_cast<std::uint64_t>(trial)});
     const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
     EXPECT_EQ(estimate.status, core::SolveStatus::kConverged) << trial << ": " << estimate.reason;
-    EXPECT_LT(estimate.summary.iterations, 20) << trial;
+    EXPECT_LT(estimate.summary.iterations, 35) << trial;  // 12 to 20, by the rounding; all 50 where it is stuck
   }
 }
 
