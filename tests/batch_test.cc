@@ -187,9 +187,9 @@ TEST(Batch, StatesMayLieBesideTheFrames) {
 TEST(Batch, BothSolversAgree) {
   const auto s = sim::simulate(scenario(), {1, 0});
   estimator::EstimatorConfig config;
-  config.solver = estimator::LinearSolver::kDenseSchur;
+  config.linear_solver = estimator::LinearSolver::kDenseSchur;
   const core::EstimateLog dense = estimator::estimate(s.measurements, config);
-  config.solver = estimator::LinearSolver::kSparseSchur;
+  config.linear_solver = estimator::LinearSolver::kSparseSchur;
   const core::EstimateLog sparse = estimator::estimate(s.measurements, config);
   // Both stop within 1e-9 of the minimal cost: a thousandth of a sigma (0.1 us).
   EXPECT_NEAR(dense.calibration.td_s, sparse.calibration.td_s, 2e-7);

@@ -147,8 +147,9 @@ inline void expect_near(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, doub
 }
 
 inline void expect_jacobian(const ceres::CostFunction& factor, const std::vector<Block>& blocks, std::size_t k,
-                            double first_step, double tolerance) {
-  expect_near(tangent_jacobian(factor, blocks, k), ridders_jacobian(factor, blocks, k, first_step), tolerance, k);
+                            double first_step, double tolerance, double floor = 1e-12) {
+  expect_near(tangent_jacobian(factor, blocks, k), ridders_jacobian(factor, blocks, k, first_step), tolerance, k,
+              floor);
 }
 
 // Residuals and Jacobians of two factors on the same blocks.

@@ -49,7 +49,8 @@ TEST_P(FactorLaws, JacobiansMatchRidders) {
     SCOPED_TRACE(i);
     const FactorScene s = GetParam().scene({.scene = i, .noise = 1.0, .off_truth = true});
     for (std::size_t k = 0; k < s.blocks.size(); ++k) {
-      expect_jacobian(*s.factor, s.blocks, k, s.blocks[k].ridders_step, GetParam().ridders_tolerance);
+      expect_jacobian(*s.factor, s.blocks, k, s.blocks[k].ridders_step, GetParam().ridders_tolerance,
+                      GetParam().zero_floor);
     }
   }
 }

@@ -44,6 +44,7 @@ struct FactorSubject {
   double zero_tolerance = 1e-9;        // of whitened residuals at the truth; what the model itself neglects
   double automatic_tolerance = 1e-10;  // relative to the largest entry of a block
   double ridders_tolerance = 1e-6;     // likewise; what differences across the model's kinks leave
+  double zero_floor = 1e-12;           // the least that those of a block are relative to, where one vanishes
   double whitening_slack = 0.0;        // of the covariance: what the noise model neglects knowingly
   bool in_world = true;                // parameters and data refer to the world's frame
 };

@@ -11,6 +11,7 @@
 #include <ceres/jet.h>
 
 #include "core/camera.h"
+#include "estimator/factors/parameter_blocks.h"
 #include "estimator/factors/ray_chart.h"
 #include "plain_camera.h"
 #include "plain_motion.h"
@@ -56,23 +57,31 @@ struct PlainLandmark {
       : b(fixed ? Vector3<T>(fixed->cast<T>()) : Vector3<T>(x[0], x[1], T(1))), lambda(fixed ? x[0] : x[2]) {}
 };
 
-// q = R_c^T (R_j^T (R_i (R_c b + lambda t_c) + lambda (t_i - t_j)) - lambda t_c)
+// q = R_c^T (R_j^T (R_i (R_a b + lambda t_a) + lambda (t_i - t_j)) - lambda t_c), (R_a, t_a) the anchor's camera
 template <class T>
-Vector3<T> plain_transfer(const PlainLandmark<T>& l, const PlainPose<T>& c, const PlainPose<T>& i,
-                          const PlainPose<T>& j) {
-  const Vector3<T> P_bi = c.q * l.b + l.lambda * c.p;
+Vector3<T> plain_transfer(const PlainLandmark<T>& l, const PlainPose<T>& a, const PlainPose<T>& c,
+                          const PlainPose<T>& i, const PlainPose<T>& j) {
+  const Vector3<T> P_bi = a.q * l.b + l.lambda * a.p;
   const Vector3<T> P_w = i.q * P_bi + l.lambda * i.p;
   const Vector3<T> P_bj = j.q.conjugate() * (P_w - l.lambda * j.p);
   return c.q.conjugate() * (P_bj - l.lambda * c.p);
 }
 
-// estimator/factors/point_factors.h
+// A camera that an anchor carries, as blocks of its numbers.
+template <class T>
+PlainPose<T> plain_carried(const core::Pose& T_B_A) {
+  const Eigen::Matrix<T, 7, 1> x = estimator::pack(T_B_A).cast<T>();
+  return PlainPose<T>(x.data());
+}
+
+// estimator/factors/point_factors.h, and anchored_point.h with a carried camera
 struct PlainPropagatedPoint {
   PlainReduction reduction;
   PlainFrame anchor;
   PlainFrame observer;
   Eigen::Vector2d observed_pixel;
-  std::optional<Eigen::Vector2d> anchor_pixel;  // where the bearing is fixed
+  std::optional<Eigen::Vector2d> anchor_pixel = std::nullopt;  // where the bearing is fixed
+  std::optional<core::Pose> T_B_A = std::nullopt;              // where the anchor is its state
 
   template <class T>
   bool operator()(const T* x_i, const T* x_j, const T* x_c, const T* td, const T* readout, const T* x_l,
@@ -115,9 +124,11 @@ struct PlainPropagatedPoint {
     if (anchor_pixel) fixed = plain_bearing<double>(reduction.camera, *anchor_pixel);
     const PlainLandmark<T> l(x_l, fixed);
     const T anchor_row = plain_pixel(reduction.camera, l.b).y();
-    const PlainPose<T> i = anchor.at(PlainState<T>(x_i), tau(anchor, *td, *readout, anchor_row));
+    const PlainPose<T> c(x_c);
     const PlainPose<T> j = observer.at(PlainState<T>(x_j), tau(observer, *td, *readout, row));
-    return plain_transfer(l, PlainPose<T>(x_c), i, j);
+    if (T_B_A) return plain_transfer(l, plain_carried<T>(*T_B_A), c, PlainPose<T>(x_i), j);
+    const PlainPose<T> i = anchor.at(PlainState<T>(x_i), tau(anchor, *td, *readout, anchor_row));
+    return plain_transfer(l, c, c, i, j);
   }
 
   template <class T>
@@ -145,21 +156,35 @@ struct PlainMovingBearing {
   }
 };
 
-// estimator/factors/feature_velocity.h
+// estimator/factors/feature_velocity.h, and anchored_point.h with a carried camera
 struct PlainFeatureVelocityPoint {
   PlainReduction reduction;
   PlainMovingBearing observed;
-  std::optional<PlainMovingBearing> anchor;  // where the bearing is fixed
+  std::optional<PlainMovingBearing> anchor = std::nullopt;  // where the bearing is fixed
+  std::optional<core::Pose> T_B_A = std::nullopt;           // where the anchor is its state
 
   template <class T>
   bool operator()(const T* x_i, const T* x_j, const T* x_c, const T* td, const T* readout, const T* x_l,
                   T* residual) const {
     PlainLandmark<T> l(x_l, anchor ? std::optional(Eigen::Vector3d(Eigen::Vector3d::UnitZ())) : std::nullopt);
     if (anchor) l.b = anchor->at(*td, *readout);
-    const Vector3<T> q = plain_transfer(l, PlainPose<T>(x_c), PlainPose<T>(x_i), PlainPose<T>(x_j));
+    const PlainPose<T> c(x_c);
+    const PlainPose<T> a = T_B_A ? plain_carried<T>(*T_B_A) : c;
+    const Vector3<T> q = plain_transfer(l, a, c, PlainPose<T>(x_i), PlainPose<T>(x_j));
     Eigen::Map<Vector2<T>> r(residual);
     r = reduction(q, observed.at(*td, *readout));
     return true;
+  }
+};
+
+// estimator/factors/anchored_point.h where the observer is the anchor.
+template <class Plain>
+struct PlainOwn {
+  Plain plain;
+
+  template <class T>
+  bool operator()(const T* x, const T* x_c, const T* td, const T* readout, const T* x_l, T* residual) const {
+    return plain(x, x, x_c, td, readout, x_l, residual);
   }
 };
 

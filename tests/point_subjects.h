@@ -103,11 +103,8 @@ inline FactorScene propagated_scene(const TwoViews& s, const Variant& variant, s
   };
   const FrameTiming anchor = timing(s.anchor, blocks[0]);
   const FrameTiming observer = timing(s.observer, blocks[1]);
-  PlainPropagatedPoint plain{{variant.residual, s.camera, kSigmaPx, pixel},
-                             plain_frame(s.anchor),
-                             plain_frame(s.observer),
-                             pixel,
-                             std::nullopt};
+  PlainPropagatedPoint plain{
+      {variant.residual, s.camera, kSigmaPx, pixel}, plain_frame(s.anchor), plain_frame(s.observer), pixel};
   FactorScene scene;
   if (variant.fixed()) {
     plain.anchor_pixel = s.anchor.pixel;
@@ -128,8 +125,7 @@ inline FactorScene feature_velocity_scene(const TwoViews& s, const Variant& vari
   const MovingBearing observed(s.camera, s.observer.offset_s, pixel, s.observer.velocity);
   const MovingBearing anchor(s.camera, s.anchor.offset_s, s.anchor.pixel, s.anchor.velocity);
   PlainFeatureVelocityPoint plain{{variant.residual, s.camera, kSigmaPx, pixel},
-                                  {s.camera, -s.observer.offset_s, pixel, s.observer.velocity},
-                                  std::nullopt};
+                                  {s.camera, -s.observer.offset_s, pixel, s.observer.velocity}};
   FactorScene scene;
   if (variant.fixed()) {
     plain.anchor = PlainMovingBearing{s.camera, -s.anchor.offset_s, s.anchor.pixel, s.anchor.velocity};

@@ -11,21 +11,10 @@
 #include "estimator/factors/imu_factor.h"
 #include "estimator/factors/prior_factors.h"
 #include "estimator/posterior.h"
+#include "estimator/robust_loss.h"
 
 namespace plumbline::estimator {
 namespace {
-
-std::unique_ptr<ceres::LossFunction> make_loss(RobustLoss loss, double scale) {
-  switch (loss) {
-    case RobustLoss::kNone:
-      return nullptr;
-    case RobustLoss::kHuber:
-      return std::make_unique<ceres::HuberLoss>(scale);
-    case RobustLoss::kCauchy:
-      return std::make_unique<ceres::CauchyLoss>(scale);
-  }
-  throw std::logic_error("make_loss: unknown loss");
-}
 
 // The search's: wide enough for honest noise, and past it an error of a hundred sigmas counts for little more than one
 // of ten.
@@ -105,8 +94,8 @@ BatchProblem::Outcome BatchProblem::solve() {
   // books of.
   constexpr std::size_t kDenseUpTo = 3000;
   const bool dense =
-      input_.config.solver == LinearSolver::kDenseSchur ||
-      (input_.config.solver == LinearSolver::kAutomatic && states_.size() * core::kStateDof <= kDenseUpTo);
+      input_.config.linear_solver == LinearSolver::kDenseSchur ||
+      (input_.config.linear_solver == LinearSolver::kAutomatic && states_.size() * core::kStateDof <= kDenseUpTo);
   ceres_options.linear_solver_type = dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   ceres_options.dense_linear_algebra_library_type = ceres::LAPACK;
   ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;

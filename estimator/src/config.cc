@@ -29,8 +29,20 @@ static void visit(core::ConfigVisitor& v, LineRules& c) {
           "a line is given up where a solution leaves an end further from it than this many sigmas");
 }
 
+static void visit(core::ConfigVisitor& v, WindowConfig& c) {
+  v.value("keyframes", c.keyframes, core::at_least(3), "states that stay");
+  v.value("kept_points", c.kept_points, core::at_least(0),
+          "points that outlive the keyframe that they are tied to, at most; the others are estimated anew");
+  v.value("freeze_td_sigma_s", c.freeze_td_sigma_s, core::positive(),
+          "no keyframe leaves while td is known worse than this, since what leaves is linearised for good");
+  v.value("longest_start_s", c.longest_start_s, core::positive(), "for so long at most");
+  v.value("outlier_sigma", c.outlier_sigma, core::positive(),
+          "an observation is given up where a solution leaves it further away than this many sigmas");
+}
+
 void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
-  v.choice("type", c.type, kEstimatorTypeNames, "`batch`: full maximum a posteriori");
+  v.choice("type", c.type, kEstimatorTypeNames,
+           "`batch`: full maximum a posteriori; `sliding_window`: online, each state from the data up to it");
   v.choice("use", c.use, kObservationUseNames, "which observations enter");
   v.choice("timing", c.timing, kTimingModelNames,
            "camera timing; `propagated`: the pose at the observation's own time, by the IMU; `feature_velocity`: the "
@@ -41,8 +53,11 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
            "`bearing_inverse_depth`: 3 dof; `fixed_bearing`: inverse depth only, the anchor's observation taken as "
            "exact, for comparison");
   v.choice("initialisation", c.initialisation, kInitialisationNames, "`prior`: starts from the scenario's prior");
-  v.choice("solver", c.solver, kLinearSolverNames,
-           "of Ceres, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
+  v.choice("solver", c.solver, kWindowSolverNames,
+           "of `sliding_window`; `schur`: our own normal equations; `ceres`: the reference, slower");
+  v.choice(
+      "linear_solver", c.linear_solver, kLinearSolverNames,
+      "of Ceres in `batch`, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
   v.value("keyframe_rate_hz", c.keyframe_rate_hz, core::positive_up_to(core::kMostFrequencyHz),
           "only keyframes' observations enter");
   v.value("pixel_sigma_px", c.pixel_sigma_px, sigma_up_to(core::kMostPixels), "scenario", "pixel noise it believes in");
@@ -56,6 +71,7 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.section("imu", c.imu, "IMU noise it believes in; must be given where the scenario's is 0");
   v.section("estimate", c.estimate, "what is free; the rest is held at the prior's mean");
   v.section("lines", c.lines, "which lines are estimated");
+  v.section("window", c.window, "of `sliding_window`");
   v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");
   v.value("max_cost_per_dof", c.max_cost_per_dof, core::positive(),
           "a mean squared whitened residual above it is a false minimum: a failed trial");

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/physical_ranges.h"
 #include "estimator/batch.h"
+#include "estimator/sliding_window.h"
 
 namespace plumbline::estimator {
 namespace {
@@ -74,6 +75,8 @@ core::EstimateLog estimate(const core::MeasurementLog& log, const EstimatorConfi
   switch (config.type) {
     case EstimatorType::kBatch:
       return estimate_batch(log, config);
+    case EstimatorType::kSlidingWindow:
+      return estimate_in_window(log, config);
   }
   throw std::logic_error("estimate: unknown type");
 }

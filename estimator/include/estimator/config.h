@@ -12,14 +12,16 @@
 
 namespace plumbline::estimator {
 
-enum class EstimatorType { kBatch };
-inline constexpr std::array<std::string_view, 1> kEstimatorTypeNames = {"batch"};
+enum class EstimatorType { kBatch, kSlidingWindow };
+inline constexpr std::array<std::string_view, 2> kEstimatorTypeNames = {"batch", "sliding_window"};
 enum class TimingModel { kPropagated, kFeatureVelocity };
 inline constexpr std::array<std::string_view, 2> kTimingModelNames = {"propagated", "feature_velocity"};
 enum class Initialisation { kPrior };
 inline constexpr std::array<std::string_view, 1> kInitialisationNames = {"prior"};
 enum class LinearSolver { kAutomatic, kSparseSchur, kDenseSchur };
 inline constexpr std::array<std::string_view, 3> kLinearSolverNames = {"automatic", "sparse_schur", "dense_schur"};
+enum class WindowSolver { kSchur, kCeres };
+inline constexpr std::array<std::string_view, 2> kWindowSolverNames = {"schur", "ceres"};
 enum class RobustLoss { kNone, kHuber, kCauchy };
 inline constexpr std::array<std::string_view, 3> kRobustLossNames = {"none", "huber", "cauchy"};
 
@@ -50,6 +52,15 @@ struct LineRules {
   double cull_sigma = 8.0;
 };
 
+// Of `sliding_window`.
+struct WindowConfig {
+  int keyframes = 10;
+  int kept_points = 40;
+  double freeze_td_sigma_s = 1e-3;
+  double longest_start_s = 4.0;
+  double outlier_sigma = 5.0;
+};
+
 struct EstimatorConfig {
   EstimatorType type = EstimatorType::kBatch;
   ObservationUse use = ObservationUse::kPointsAndLines;
@@ -57,7 +68,8 @@ struct EstimatorConfig {
   ResidualType residual = ResidualType::kPinhole;
   LandmarkType landmark = LandmarkType::kBearingInverseDepth;
   Initialisation initialisation = Initialisation::kPrior;
-  LinearSolver solver = LinearSolver::kAutomatic;
+  WindowSolver solver = WindowSolver::kSchur;
+  LinearSolver linear_solver = LinearSolver::kAutomatic;
   double keyframe_rate_hz = 10.0;
   std::optional<double> pixel_sigma_px;
   std::optional<double> line_sigma_px;
@@ -67,6 +79,7 @@ struct EstimatorConfig {
   ImuNoiseOverride imu;
   EstimateWhat estimate;
   LineRules lines;
+  WindowConfig window;
   int max_iterations = 50;
   double max_cost_per_dof = 2.0;
 };

@@ -1,0 +1,62 @@
+// A window's least-squares problem, and the two ways to solve it:
+//   min  |r_prior|^2/2 + sum_i rho(|r_i|^2)/2
+// over parameter blocks of which some, the landmarks, meet each other in no term: they are eliminated first (Schur
+// complement). Ceres is the reference; `schur` does the same with less bookkeeping (schur_system.h).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include <ceres/cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/manifold.h>
+
+#include "core/estimate.h"
+#include "estimator/marginal_prior.h"
+
+namespace plumbline::estimator {
+
+struct ParameterBlock {
+  double* values = nullptr;
+  int size = 0;
+  int dof = 0;
+  const ceres::Manifold* manifold = nullptr;  // null: plain numbers
+  bool constant = false;
+  bool eliminated = false;
+  // What is added to its information when it is eliminated, of the last of its numbers and as a share of the diagonal:
+  // what no observation tells must not be divided by.
+  double last_information = 0.0;
+  double share_of_information = 0.0;
+};
+
+struct ResidualTerm {
+  const ceres::CostFunction* factor = nullptr;
+  std::array<int, 6> blocks = {};
+  int count = 0;
+  const ceres::LossFunction* loss = nullptr;
+};
+
+// Blocks that are not eliminated come in the order of their columns; terms of an eliminated block stand together.
+struct LeastSquares {
+  std::vector<ParameterBlock> blocks;
+  std::vector<ResidualTerm> terms;
+  const MarginalPrior* prior = nullptr;
+  std::vector<int> prior_blocks;  // of its parts
+};
+
+struct LeastSquaresOptions {
+  int max_iterations = 50;
+  // The last step's length in standard deviations, |delta|_H: what is left is about its square.
+  double step_tolerance = 1e-2;
+};
+
+struct LeastSquaresResult {
+  core::SolveStatus status = core::SolveStatus::kDiverged;
+  int iterations = 0;  // linear systems that were solved
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+};
+
+LeastSquaresResult solve_with_ceres(const LeastSquares& problem, const LeastSquaresOptions& options);
+
+}  // namespace plumbline::estimator
