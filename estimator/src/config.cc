@@ -35,7 +35,13 @@ static void visit(core::ConfigVisitor& v, WindowConfig& c) {
           "points that outlive the keyframe that they are tied to, at most; the others are estimated anew");
   v.value("freeze_td_sigma_s", c.freeze_td_sigma_s, core::positive(),
           "no keyframe leaves while td is known worse than this, since what leaves is linearised for good");
-  v.value("longest_start_s", c.longest_start_s, core::positive(), "for so long at most");
+  v.value("start_keyframes", c.start_keyframes, core::at_least(3), "until then, so many stay at most");
+  v.value("keyframe_parallax_px", c.keyframe_parallax_px, core::at_least(0.0),
+          "the newest frame stays where points have moved by so much since the last that stayed, the camera's "
+          "rotation and the pixels' noise taken out (median); else it is replaced by the next");
+  v.value("largest_depth_sigma", c.largest_depth_sigma, core::positive(),
+          "a point is not used, and leaves without a trace, while its inverse depth is known worse than this share of "
+          "itself: what it says of the motion would be as wrong as its depth");
   v.value("outlier_sigma", c.outlier_sigma, core::positive(),
           "an observation is given up where a solution leaves it further away than this many sigmas");
 }

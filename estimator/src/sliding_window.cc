@@ -1,7 +1,10 @@
 #include "estimator/sliding_window.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -31,6 +34,8 @@ class OnlineEstimate {
 
   std::optional<Failure> run() {
     for (const std::size_t frame : select_keyframes(log_.frames, config_.keyframe_rate_hz)) {
+      if (!newest_stays_) window_.drop_newest();
+      newest_stays_ = true;
       if (!window_.add_frame(frame)) continue;
       if (auto failure = step()) return failure;
     }
@@ -69,16 +74,55 @@ class OnlineEstimate {
       return Failure{core::SolveStatus::kDiverged,
                      fmt::format("the window of the keyframe at {} ns could not be solved", t_ns)};
     }
+    if (auto failure = watch(t_ns, *solution, fit, outliers)) return failure;
+    summarise(*solution, fit);
     covariance_ = *solution->covariance;
     record(t_ns);
-    const core::TimeNs first_ns = result_.state_history.front().t_ns;
-    const bool settled = !config_.estimate.td ||
-                         std::sqrt(covariance_(core::kCovTd, core::kCovTd)) < config_.window.freeze_td_sigma_s ||
-                         core::to_seconds(t_ns - first_ns) > config_.window.longest_start_s;
-    if (settled || window_.folded()) {
-      while (window_.size() > static_cast<std::size_t>(config_.window.keyframes)) window_.fold_oldest();
+    newest_stays_ = window_.size() < 3 ||
+                    !(window_.parallax_of_newest_px().value_or(1e9) < config_.window.keyframe_parallax_px);
+    if (!newest_stays_) return std::nullopt;
+    const bool td_is_known =
+        !config_.estimate.td || std::sqrt(covariance_(core::kCovTd, core::kCovTd)) < config_.window.freeze_td_sigma_s;
+    const int most = td_is_known || window_.folded() ? config_.window.keyframes : config_.window.start_keyframes;
+    while (window_.size() > static_cast<std::size_t>(std::max(most, config_.window.keyframes))) window_.fold_oldest();
+    return std::nullopt;
+  }
+
+  // Once is an accident, so many keyframes in a row are not.
+  static constexpr int kPatience = 10;
+
+  // What an estimate that has gone astray shows.
+  std::optional<Failure> watch(core::TimeNs t_ns, const WindowSolution& solution, const WindowFit& fit, int outliers) {
+    const auto count = [](int& in_a_row, bool bad) { in_a_row = bad ? in_a_row + 1 : 0; };
+    const double squares_per_residual = fit.visual.residuals > 0 ? fit.visual.squares / fit.visual.residuals : 0.0;
+    count(unsolved_, solution.result.status == core::SolveStatus::kIterationLimit);
+    count(misfits_, squares_per_residual > config_.max_cost_per_dof);
+    count(rejections_, 2 * outliers > window_.observations_of_newest());
+    const std::string since = fmt::format("of {} keyframes in a row up to {} ns", kPatience, t_ns);
+    if (unsolved_ >= kPatience && window_.folded()) {
+      return Failure{core::SolveStatus::kIterationLimit,
+                     fmt::format("the windows {} took more than estimator.max_iterations = {}", since,
+                                 config_.max_iterations)};
+    }
+    if (misfits_ >= kPatience) {
+      return Failure{core::SolveStatus::kFalseMinimum,
+                     fmt::format("mean squared residual {:.3g} of sigma^2 in the windows {}, above "
+                                 "estimator.max_cost_per_dof = {}",
+                                 squares_per_residual, since, config_.max_cost_per_dof)};
+    }
+    if (rejections_ >= kPatience) {
+      return Failure{core::SolveStatus::kFalseMinimum,
+                     fmt::format("more than half as many observations as fit do not fit the windows {}", since)};
     }
     return std::nullopt;
+  }
+
+  void summarise(const WindowSolution& solution, const WindowFit& fit) {
+    core::SolveSummary& summary = result_.summary;
+    summary.initial_cost = solution.result.initial_cost;
+    summary.final_cost = solution.result.final_cost;
+    summary.observations = solution.observations;
+    summary.visual = fit.visual;
   }
 
   bool must_retime() const {
@@ -100,6 +144,10 @@ class OnlineEstimate {
   const core::MeasurementLog& log_;
   const EstimatorConfig& config_;
   Window window_;
+  bool newest_stays_ = true;
+  int unsolved_ = 0;  // keyframes in a row
+  int misfits_ = 0;
+  int rejections_ = 0;
   core::PosteriorCovariance covariance_ = core::PosteriorCovariance::Zero();
   core::EstimateLog result_;
 };
@@ -108,7 +156,12 @@ class OnlineEstimate {
 
 core::EstimateLog estimate_in_window(const core::MeasurementLog& log, const EstimatorConfig& config) {
   OnlineEstimate online(log, config);
-  const std::optional<Failure> failure = online.run();
+  std::optional<Failure> failure;
+  try {
+    failure = online.run();
+  } catch (const std::domain_error& error) {
+    failure = Failure{core::SolveStatus::kDiverged, error.what()};
+  }
   core::EstimateLog result = online.take();
   if (failure) {
     result.status = failure->status;

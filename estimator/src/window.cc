@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -162,16 +163,36 @@ std::unique_ptr<const ceres::CostFunction> Window::make_factor(const WindowPoint
   return std::make_unique<AnchoredPoint<VelocitySight>>(sight, point.T_B_A);
 }
 
-bool Window::can_evaluate(const WindowPoint& point, const WindowObservation& o) const {
-  if (o.factor == nullptr) return true;
+std::optional<Eigen::Vector2d> Window::residual_of(const WindowPoint& point, const WindowObservation& o,
+                                                   const Eigen::Vector3d& landmark) const {
   std::array<const double*, 6> parameters = {};
   std::size_t n = 0;
   parameters[n++] = point.anchor->x.data();
   if (!is_free_point() || o.frame != point.anchor) parameters[n++] = o.frame->x.data();
   for (const double* calibration : {extrinsics_.data(), &td_s_, &readout_s_}) parameters[n++] = calibration;
-  parameters[n++] = is_free_point() ? point.landmark.data() : &point.landmark.z();
+  parameters[n++] = is_free_point() ? landmark.data() : &landmark.z();
   Eigen::Vector2d residual;
-  return o.factor->Evaluate(parameters.data(), residual.data(), nullptr);
+  if (!o.factor->Evaluate(parameters.data(), residual.data(), nullptr)) return std::nullopt;
+  return residual;
+}
+
+bool Window::can_evaluate(const WindowPoint& point, const WindowObservation& o) const {
+  return o.factor == nullptr || residual_of(point, o, point.landmark).has_value();
+}
+
+// A picture is nearly linear in the inverse depth: what it moves by from there to infinity, in sigmas, is lambda/sigma.
+bool Window::depth_is_known(const WindowPoint& point) const {
+  if (!(point.landmark.z() > 0.0)) return false;
+  const Eigen::Vector3d at_infinity(point.landmark.x(), point.landmark.y(), 0.0);
+  double squares = 0.0;
+  for (const WindowObservation& o : point.observations) {
+    if (o.factor == nullptr) continue;
+    const auto here = residual_of(point, o, point.landmark);
+    const auto there = residual_of(point, o, at_infinity);
+    if (here && there) squares += (*there - *here).squaredNorm();
+  }
+  const double limit = 1.0 / config_.window.largest_depth_sigma;
+  return squares > limit * limit;
 }
 
 // False where one of them cannot be evaluated.
@@ -200,7 +221,7 @@ void Window::triangulate() {
       if (!moved) continue;
       point.landmark = moved->landmark;
     }
-    point.has_value = make_factors(point);
+    point.has_value = make_factors(point) && depth_is_known(point);
   }
   const LineStartRules rules{.sigma_px = noise_.line_sigma_px,
                              .largest_depth_sigma = config_.lines.largest_depth_sigma};
@@ -253,6 +274,30 @@ void Window::retime(double td_s) {
   for (auto& [id, point] : points_) point.has_value = false;
   for (auto& [id, line] : lines_) line.value.reset();
   triangulate();
+}
+
+std::optional<double> Window::parallax_of_newest_px() const {
+  const WindowFrame* const newest = frames_.back().get();
+  const WindowFrame* const before = frames_[frames_.size() - 2].get();
+  const auto rotation = [&](const WindowFrame& frame, double row_px) {
+    return Eigen::Quaterniond(camera_pose(frame, row_px).q);
+  };
+  std::vector<double> moved;
+  for (const auto& [id, point] : points_) {
+    const std::size_t n = point.observations.size();
+    if (n < 2 || point.observations[n - 1].frame != newest || point.observations[n - 2].frame != before) continue;
+    const Eigen::Vector2d& from = point.observations[n - 2].pixel;
+    const Eigen::Vector2d& to = point.observations[n - 1].pixel;
+    const Eigen::Vector3d ray = rotation(*newest, to.y()).conjugate() *
+                                (rotation(*before, from.y()) * log_.camera.unproject(from));
+    if (const auto turned = log_.camera.project(ray)) moved.push_back((to - *turned).squaredNorm());
+  }
+  if (moved.empty()) return std::nullopt;
+  const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2);
+  std::nth_element(moved.begin(), middle, moved.end());
+  // Of the noise of two pixels alone the median is 4 ln 2 sigma^2.
+  const double noise2 = 4.0 * std::numbers::ln2 * noise_.pixel_sigma_px * noise_.pixel_sigma_px;
+  return std::sqrt(std::max(0.0, *middle - noise2));
 }
 
 int Window::observations_of_newest() const {

@@ -74,6 +74,10 @@ void Window::fold_oldest() {
   for (auto& [id, point] : points_) {
     if (!point.has_value || point.anchor != leaving) continue;
     const bool seen = !point.observations.empty() && point.observations.back().frame == newest;
+    if (!point.in_prior && !depth_is_known(point)) {
+      leaving_ids.push_back(id);
+      continue;
+    }
     if (seen && is_free_point()) {
       const auto change = change_anchor(point.landmark, unpack_pose(leaving->x.data()) * point.T_B_A, T_W_A_new);
       if (change && point.in_prior) {

@@ -57,7 +57,9 @@ struct WindowConfig {
   int keyframes = 10;
   int kept_points = 40;
   double freeze_td_sigma_s = 1e-3;
-  double longest_start_s = 4.0;
+  int start_keyframes = 40;
+  double keyframe_parallax_px = 2.0;
+  double largest_depth_sigma = 0.2;
   double outlier_sigma = 5.0;
 };
 

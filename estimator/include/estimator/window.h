@@ -102,6 +102,13 @@ class Window {
   // The oldest state leaves.
   void fold_oldest();
 
+  // How far points have moved in the picture from the keyframe before to the newest, the rotation between them and the
+  // noise of pixels taken out [px]; the median. Nothing where they share none.
+  std::optional<double> parallax_of_newest_px() const;
+
+  // The newest frame leaves without a trace.
+  void drop_newest() { remove_frame(frames_.size() - 1); }
+
   // While nothing has left: puts the states where td says that the frames were.
   void retime(double td_s);
 
@@ -125,6 +132,9 @@ class Window {
                                                          const WindowObservation& observation) const;
   bool make_factors(WindowPoint& point);
   bool can_evaluate(const WindowPoint& point, const WindowObservation& observation) const;
+  std::optional<Eigen::Vector2d> residual_of(const WindowPoint& point, const WindowObservation& observation,
+                                             const Eigen::Vector3d& landmark) const;
+  bool depth_is_known(const WindowPoint& point) const;
   void add_calibration(Built& built);
   void add_point_terms(WindowPoint& point, Built& built, const WindowFrame* only_of = nullptr);
   void add_line_terms(WindowLine& line, Built& built);
