@@ -57,6 +57,11 @@ class OnlineEstimate {
     std::optional<WindowSolution> solution;
     WindowFit fit;
     int outliers = 0;
+    // Where td and the depths are still to be found, a wrong match would be taken for motion.
+    if (!window_.folded()) {
+      window_.solve(true);
+      outliers += window_.assess(true).outliers;
+    }
     constexpr int kMaxRounds = 4;
     for (int round = 0; round < kMaxRounds; ++round) {
       solution = window_.solve();
@@ -78,8 +83,8 @@ class OnlineEstimate {
     summarise(*solution, fit);
     covariance_ = *solution->covariance;
     record(t_ns);
-    newest_stays_ = window_.size() < 3 ||
-                    !(window_.parallax_of_newest_px().value_or(1e9) < config_.window.keyframe_parallax_px);
+    newest_stays_ =
+        window_.size() < 3 || !(window_.parallax_of_newest_px().value_or(1e9) < config_.window.keyframe_parallax_px);
     if (!newest_stays_) return std::nullopt;
     const bool td_is_known =
         !config_.estimate.td || std::sqrt(covariance_(core::kCovTd, core::kCovTd)) < config_.window.freeze_td_sigma_s;
@@ -100,9 +105,9 @@ class OnlineEstimate {
     count(rejections_, 2 * outliers > window_.observations_of_newest());
     const std::string since = fmt::format("of {} keyframes in a row up to {} ns", kPatience, t_ns);
     if (unsolved_ >= kPatience && window_.folded()) {
-      return Failure{core::SolveStatus::kIterationLimit,
-                     fmt::format("the windows {} took more than estimator.max_iterations = {}", since,
-                                 config_.max_iterations)};
+      return Failure{
+          core::SolveStatus::kIterationLimit,
+          fmt::format("the windows {} took more than estimator.max_iterations = {}", since, config_.max_iterations)};
     }
     if (misfits_ >= kPatience) {
       return Failure{core::SolveStatus::kFalseMinimum,
@@ -133,6 +138,11 @@ class OnlineEstimate {
   void record(core::TimeNs t_ns) {
     const core::State state = unpack_state(window_.newest().x.data());
     const auto P = covariance_.bottomRightCorner<core::kStateDof, core::kStateDof>();
+    // Frames that an earlier td put later than this one now lies.
+    const auto later = [&](const auto& entry) { return entry.t_ns >= t_ns; };
+    std::erase_if(result_.states, later);
+    std::erase_if(result_.state_history, later);
+    std::erase_if(result_.td_history, later);
     result_.states.push_back({t_ns, state});
     result_.state_history.push_back({t_ns, state, P});
     if (config_.estimate.td) {

@@ -24,7 +24,8 @@ Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config)
       td_s_(log.prior.start_calibration.td_s),
       readout_s_(log.prior.start_calibration.readout_s),
       timing_td_s_(config.state_td_s.value_or(td_s_)),
-      loss_(make_loss(config.loss, config.loss_scale)) {
+      loss_(make_loss(config.loss, config.loss_scale)),
+      doubtful_loss_(make_loss(RobustLoss::kCauchy, 3.0)) {
   const CameraModel camera{.camera = log.camera,
                            .pixel_sigma_px = noise_.pixel_sigma_px,
                            .gravity_m_s2 = log.gravity_m_s2,
@@ -288,8 +289,8 @@ std::optional<double> Window::parallax_of_newest_px() const {
     if (n < 2 || point.observations[n - 1].frame != newest || point.observations[n - 2].frame != before) continue;
     const Eigen::Vector2d& from = point.observations[n - 2].pixel;
     const Eigen::Vector2d& to = point.observations[n - 1].pixel;
-    const Eigen::Vector3d ray = rotation(*newest, to.y()).conjugate() *
-                                (rotation(*before, from.y()) * log_.camera.unproject(from));
+    const Eigen::Vector3d ray =
+        rotation(*newest, to.y()).conjugate() * (rotation(*before, from.y()) * log_.camera.unproject(from));
     if (const auto turned = log_.camera.project(ray)) moved.push_back((to - *turned).squaredNorm());
   }
   if (moved.empty()) return std::nullopt;

@@ -115,7 +115,7 @@ Window::Built Window::build_all() {
 
 LeastSquares Window::problem() { return build_all().problem; }
 
-WindowSolution Window::solve() {
+WindowSolution Window::solve(bool doubtful) {
   // The biases' effect on a preintegrated rotation is linear to half the square of this [rad].
   constexpr double kRelineariseRad = 1e-5;
   for (std::size_t i = 1; i < frames_.size(); ++i) {
@@ -124,7 +124,10 @@ WindowSolution Window::solve() {
     const double moved = (before.bias.gyro_rad_s - frames_[i]->inertial_bias.gyro_rad_s).norm();
     if (moved * dt_s > kRelineariseRad) make_inertial(i);
   }
-  const Built built = build_all();
+  Built built = build_all();
+  if (doubtful) {
+    for (std::size_t t = 0; t < built.visual_terms; ++t) built.problem.terms[t].loss = doubtful_loss_.get();
+  }
   // Steps of Gauss and Newton: after one of half a standard deviation, in all dimensions together, what is left is a
   // small share of that.
   const LeastSquaresOptions options{.max_iterations = config_.max_iterations, .step_tolerance = 0.5};
@@ -138,7 +141,7 @@ WindowSolution Window::solve() {
     factored = solution.result.status != core::SolveStatus::kDiverged && system.build(0.0) && system.solve();
   }
   solution.observations = static_cast<int>(built.visual_terms);
-  if (solution.result.status == core::SolveStatus::kDiverged || !factored) return solution;
+  if (doubtful || solution.result.status == core::SolveStatus::kDiverged || !factored) return solution;
 
   // L = [ L11 0; L21 L22 ], so that the last rows and columns of (L L^T)^-1 are (L22 L22^T)^-1. The newest state stands
   // before the calibration there.

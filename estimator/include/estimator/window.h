@@ -94,7 +94,8 @@ class Window {
   // What solve() solves, on the window's own values.
   LeastSquares problem();
 
-  WindowSolution solve();
+  // `doubtful`: with a loss that wrong matches cannot pull along, and without a covariance.
+  WindowSolution solve(bool doubtful = false);
 
   // With `reject`, the observations that the present values speak against are taken out.
   WindowFit assess(bool reject);
@@ -168,6 +169,7 @@ class Window {
   PoseManifold pose_manifold_;
   OrthonormalLineManifold line_manifold_;
   std::unique_ptr<ceres::LossFunction> loss_;
+  std::unique_ptr<ceres::LossFunction> doubtful_loss_;
 };
 
 }  // namespace plumbline::estimator

@@ -1,0 +1,172 @@
+// The online estimator on simulated recordings: its own error, consistency, how far off it may start, what it refuses.
+#include <cmath>
+#include <cstdint>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "estimator/estimate.h"
+#include "nees_over_trials.h"
+#include "short_recording.h"
+#include "sim/simulate.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Errors;
+using testing::errors_of;
+
+estimator::EstimatorConfig online() {
+  estimator::EstimatorConfig config;
+  config.type = estimator::EstimatorType::kSlidingWindow;
+  return config;
+}
+
+sim::ScenarioConfig scenario() { return testing::short_scenario(40); }
+
+double sigma_of(const core::EstimateLog& estimate, int i) { return std::sqrt(estimate.covariance(i, i)); }
+
+// Without noise all that is left is the midpoint rule: second order, so a quarter from each rate to the next.
+TEST(SlidingWindow, NoiseFreeErrorIsTheIntegratorsAndFallsWithItsOrder) {
+  estimator::EstimatorConfig config = testing::believing(testing::kEurocLike, 1.0);
+  config.type = estimator::EstimatorType::kSlidingWindow;
+  double last_td_s = 0.0;
+  for (const double rate : {200.0, 400.0}) {
+    const auto s = sim::simulate(testing::noise_free(scenario(), rate), {1, 0});
+    const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
+    ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
+    const Errors e = errors_of(estimate, s.truth);
+    const core::StampedState& last = estimate.states.back();
+    const double final_m = (last.state.T_W_B.p - sim::state_at(s.truth, last.t_ns).T_W_B.p).norm();
+    if (rate == 200.0) {
+      EXPECT_LT(std::abs(e.td_s), 1e-6);
+      EXPECT_LT(final_m, 1e-3);
+    } else {
+      EXPECT_NEAR(last_td_s / e.td_s, 4.0, 1.0);
+    }
+    last_td_s = e.td_s;
+  }
+}
+
+TEST(SlidingWindow, NeesIsInsideItsBand) {
+  testing::NeesOverTrials trials;
+  for (std::uint64_t trial = 0; trial < 40; ++trial) {
+    const auto s = sim::simulate(scenario(), {2, trial});
+    const core::EstimateLog estimate = estimator::estimate(s.measurements, online());
+    ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << trial << ": " << estimate.reason;
+    EXPECT_EQ(estimate.states.size(), estimate.state_history.size());
+    EXPECT_EQ(estimate.td_history.size(), estimate.state_history.size());
+    trials.add(estimate, s.truth);
+  }
+  trials.expect_inside_bands();
+  trials.expect_scaled_outside({"td_error_s", "calibration", "final_pose", "final_velocity", "final_bias", "joint"});
+}
+
+// The prior's mean is 0 whatever td is; five sigma, in which a trial may fail, but not with an answer that is wrong.
+TEST(SlidingWindow, FindsTdFromFarOff) {
+  for (const double td_s : {-0.05, 0.05, -0.15, 0.15}) {
+    sim::ScenarioConfig c = scenario();
+    c.camera.td_s = td_s;
+    c.prior.td_mean_s = 0.0;
+    c.prior.td_sigma_s = 0.03;
+    const auto s = sim::simulate(c, {1, 4});
+    const core::EstimateLog estimate = estimator::estimate(s.measurements, online());
+    if (std::abs(td_s) < 0.1) {
+      EXPECT_EQ(estimate.status, core::SolveStatus::kConverged) << td_s << ": " << estimate.reason;
+    }
+    if (estimate.status != core::SolveStatus::kConverged) {
+      EXPECT_FALSE(estimate.reason.empty());
+      continue;
+    }
+    // 4.5 sigma: 7 in a million.
+    EXPECT_LT(std::abs(errors_of(estimate, s.truth).td_s), 4.5 * sigma_of(estimate, core::kCovTd)) << td_s;
+    EXPECT_LT(sigma_of(estimate, core::kCovTd), 0.5e-3);
+  }
+}
+
+TEST(SlidingWindow, TheSolversGiveTheSameAnswer) {
+  const auto s = sim::simulate(scenario(), {1, 5});
+  estimator::EstimatorConfig config = online();
+  const core::EstimateLog schur = estimator::estimate(s.measurements, config);
+  const core::EstimateLog again = estimator::estimate(s.measurements, config);
+  config.solver = estimator::WindowSolver::kCeres;
+  const core::EstimateLog ceres = estimator::estimate(s.measurements, config);
+  ASSERT_EQ(schur.status, core::SolveStatus::kConverged);
+  ASSERT_EQ(ceres.status, core::SolveStatus::kConverged);
+  EXPECT_EQ(schur.calibration.td_s, again.calibration.td_s);
+  EXPECT_EQ(schur.covariance, again.covariance);
+  // Both end within a fraction of a standard deviation of the minimum, each at its own place.
+  EXPECT_LT(std::abs(schur.calibration.td_s - ceres.calibration.td_s), 0.2 * sigma_of(schur, core::kCovTd));
+  EXPECT_NEAR(sigma_of(schur, core::kCovTd) / sigma_of(ceres, core::kCovTd), 1.0, 0.05);
+}
+
+TEST(SlidingWindow, WrongMatchesAreTakenOut) {
+  sim::ScenarioConfig c = scenario();
+  c.camera.gross_outlier_probability = 0.03;
+  const auto s = sim::simulate(c, {1, 6});
+  const core::EstimateLog robust = estimator::estimate(s.measurements, online());
+  ASSERT_EQ(robust.status, core::SolveStatus::kConverged) << robust.reason;
+  EXPECT_LT(std::abs(errors_of(robust, s.truth).td_s), 4.5 * sigma_of(robust, core::kCovTd));
+  // All of them believed: wrong, and it says so.
+  estimator::EstimatorConfig config = online();
+  config.window.outlier_sigma = 1e6;
+  const core::EstimateLog misled = estimator::estimate(s.measurements, config);
+  EXPECT_NE(misled.status, core::SolveStatus::kConverged);
+  EXPECT_FALSE(misled.reason.empty());
+}
+
+// A td that is held 60 ms off leaves no pose that fits: a failure with its cause, not an answer.
+TEST(SlidingWindow, AWrongModelEndsAsANamedFailure) {
+  sim::ScenarioConfig c = scenario();
+  c.camera.td_s = 0.06;
+  c.prior.td_mean_s = 0.0;
+  const auto s = sim::simulate(c, {1, 7});
+  estimator::EstimatorConfig config = online();
+  config.estimate.td = false;
+  const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
+  EXPECT_EQ(estimate.status, core::SolveStatus::kFalseMinimum);
+  EXPECT_THAT(estimate.reason, ::testing::HasSubstr("keyframes in a row"));
+}
+
+TEST(SlidingWindow, LinesHelpOnline) {
+  sim::ScenarioConfig c = scenario();
+  c.world.type = sim::WorldType::kRooms;
+  c.points.per_frame = 8;
+  c.world.lines.random = 800;
+  c.lines.per_frame = 25;
+  const auto s = sim::simulate(c, {1, 8});
+  estimator::EstimatorConfig config = online();
+  config.window.start_keyframes = config.window.keyframes;  // else the worse one is a batch for longer
+  const core::EstimateLog both = estimator::estimate(s.measurements, config);
+  config.use = estimator::ObservationUse::kPoints;
+  const core::EstimateLog points = estimator::estimate(s.measurements, config);
+  ASSERT_EQ(both.status, core::SolveStatus::kConverged) << both.reason;
+  ASSERT_EQ(points.status, core::SolveStatus::kConverged) << points.reason;
+  EXPECT_LT(std::abs(errors_of(both, s.truth).td_s), 4.5 * sigma_of(both, core::kCovTd));
+  EXPECT_LT(sigma_of(both, core::kCovTd), 0.9 * sigma_of(points, core::kCovTd));
+  EXPECT_GT(both.summary.observations, points.summary.observations + 50);
+}
+
+TEST(SlidingWindow, EveryModelOfTheFactorLibraryRuns) {
+  sim::ScenarioConfig c = scenario();
+  c.points.velocity_source = sim::VelocitySource::kExact;
+  const auto s = sim::simulate(c, {1, 9});
+  for (const auto timing : {estimator::TimingModel::kPropagated, estimator::TimingModel::kFeatureVelocity}) {
+    for (const auto residual : {estimator::ResidualType::kPinhole, estimator::ResidualType::kUnitSphere}) {
+      for (const auto landmark :
+           {estimator::LandmarkType::kBearingInverseDepth, estimator::LandmarkType::kFixedBearing}) {
+        estimator::EstimatorConfig config = online();
+        config.timing = timing;
+        config.residual = residual;
+        config.landmark = landmark;
+        config.max_cost_per_dof = 10.0;  // the other models are approximations
+        const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
+        ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
+        EXPECT_LT(std::abs(errors_of(estimate, s.truth).td_s), 1.5e-3);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace plumbline
