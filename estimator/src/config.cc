@@ -39,9 +39,12 @@ static void visit(core::ConfigVisitor& v, WindowConfig& c) {
   v.value("keyframe_parallax_px", c.keyframe_parallax_px, core::at_least(0.0),
           "the newest frame stays where points have moved by so much since the last that stayed, the camera's "
           "rotation and the pixels' noise taken out (median); else it is replaced by the next");
-  v.value("largest_depth_sigma", c.largest_depth_sigma, core::positive(),
-          "a point is not used, and leaves without a trace, while its inverse depth is known worse than this share of "
-          "itself: what it says of the motion would be as wrong as its depth");
+  v.value(
+      "largest_depth_sigma", c.largest_depth_sigma, core::positive(),
+      "a point leaves without a trace while its inverse depth is known worse than this share of itself: what it says "
+      "of the motion would be as wrong as its depth");
+  v.value("usual_depth_m", c.usual_depth_m, core::positive(),
+          "until then its inverse depth is that of this depth, give or take as much");
   v.value("outlier_sigma", c.outlier_sigma, core::positive(),
           "an observation is given up where a solution leaves it further away than this many sigmas");
 }

@@ -24,6 +24,8 @@ Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config)
       td_s_(log.prior.start_calibration.td_s),
       readout_s_(log.prior.start_calibration.readout_s),
       timing_td_s_(config.state_td_s.value_or(td_s_)),
+      usual_depth_(config.window.usual_depth_m),
+      usual_depth_of_fixed_(config.window.usual_depth_m),
       loss_(make_loss(config.loss, config.loss_scale)),
       doubtful_loss_(make_loss(RobustLoss::kCauchy, 3.0)) {
   const CameraModel camera{.camera = log.camera,
@@ -177,12 +179,17 @@ std::optional<Eigen::Vector2d> Window::residual_of(const WindowPoint& point, con
   return residual;
 }
 
+const ceres::CostFunction* Window::usual_depth() const {
+  if (is_free_point()) return &usual_depth_;
+  return &usual_depth_of_fixed_;
+}
+
 bool Window::can_evaluate(const WindowPoint& point, const WindowObservation& o) const {
   return o.factor == nullptr || residual_of(point, o, point.landmark).has_value();
 }
 
 // A picture is nearly linear in the inverse depth: what it moves by from there to infinity, in sigmas, is lambda/sigma.
-bool Window::depth_is_known(const WindowPoint& point) const {
+bool Window::tells_depth(const WindowPoint& point) const {
   if (!(point.landmark.z() > 0.0)) return false;
   const Eigen::Vector3d at_infinity(point.landmark.x(), point.landmark.y(), 0.0);
   double squares = 0.0;
@@ -222,7 +229,10 @@ void Window::triangulate() {
       if (!moved) continue;
       point.landmark = moved->landmark;
     }
-    point.has_value = make_factors(point) && depth_is_known(point);
+    point.has_value = make_factors(point);
+  }
+  for (auto& [id, point] : points_) {
+    if (point.has_value && !point.depth_is_known) point.depth_is_known = tells_depth(point);
   }
   const LineStartRules rules{.sigma_px = noise_.line_sigma_px,
                              .largest_depth_sigma = config_.lines.largest_depth_sigma};
@@ -272,7 +282,7 @@ void Window::retime(double td_s) {
     ++i;
   }
   for (std::size_t i = 1; i < frames_.size(); ++i) make_inertial(i);
-  for (auto& [id, point] : points_) point.has_value = false;
+  for (auto& [id, point] : points_) point.has_value = point.depth_is_known = false;
   for (auto& [id, line] : lines_) line.value.reset();
   triangulate();
 }

@@ -74,7 +74,7 @@ void Window::fold_oldest() {
   for (auto& [id, point] : points_) {
     if (!point.has_value || point.anchor != leaving) continue;
     const bool seen = !point.observations.empty() && point.observations.back().frame == newest;
-    if (!point.in_prior && !depth_is_known(point)) {
+    if (!point.depth_is_known && !tells_depth(point)) {
       leaving_ids.push_back(id);
       continue;
     }
@@ -206,6 +206,7 @@ void Window::fold_oldest() {
   // The new values, so that the prior is about them.
   for (const Move& move : moves) {
     WindowPoint& point = *move.point;
+    point.depth_is_known = true;
     point.landmark = move.change.landmark;
     point.anchor = newest;
     point.T_B_A = T_B_C;

@@ -61,6 +61,9 @@ void Window::add_point_terms(WindowPoint& point, Built& built, const WindowFrame
     built.problem.blocks.back().eliminated = true;
     built.problem.blocks.back().last_information = kDepthInformation;
   }
+  if (!point.depth_is_known && only_of == nullptr) {
+    built.problem.terms.push_back({.factor = usual_depth(), .blocks = {landmark}, .count = 1});
+  }
   for (const WindowObservation& o : point.observations) {
     if (!used(o)) continue;
     ResidualTerm term{.factor = o.factor.get(), .loss = loss_.get()};
@@ -177,6 +180,7 @@ WindowFit Window::assess(bool reject) {
   std::set<const ceres::CostFunction*> outliers;
   for (std::size_t t = 0; t < built.visual_terms; ++t) {
     const ResidualTerm& term = built.problem.terms[t];
+    if (term.factor == usual_depth()) continue;
     for (int b = 0; b < term.count; ++b) {
       const auto i = static_cast<std::size_t>(b);
       parameters[i] = built.problem.blocks[static_cast<std::size_t>(term.blocks[i])].values;

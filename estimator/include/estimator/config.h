@@ -60,6 +60,7 @@ struct WindowConfig {
   int start_keyframes = 40;
   double keyframe_parallax_px = 2.0;
   double largest_depth_sigma = 0.2;
+  double usual_depth_m = 5.0;
   double outlier_sigma = 5.0;
 };
 

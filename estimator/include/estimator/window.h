@@ -6,6 +6,7 @@
 // and so do lines. No observation is used twice, and a track that goes on after that begins a new landmark.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <ceres/sized_cost_function.h>
 
 #include "core/estimate.h"
 #include "core/measurements.h"
@@ -49,9 +51,30 @@ struct WindowPoint {
   core::Pose T_B_A;                                    // the camera that the anchor carries
   Eigen::Vector3d landmark = Eigen::Vector3d::Zero();  // (x, y, lambda)
   bool has_value = false;
+  bool depth_is_known = false;  // once and for all
   bool in_prior = false;
   int rejected = 0;  // observations
   std::vector<WindowObservation> observations;
+};
+
+// A point whose depth no parallax has told yet: an inverse depth of 1/m, give or take as much, m what is usual. Without
+// it the noise of two views would make the point as near as it likes, and what near points say of the motion is much.
+// The second row is nothing.
+template <int kSize>
+class UsualDepthFactor final : public ceres::SizedCostFunction<2, kSize> {
+ public:
+  explicit UsualDepthFactor(double usual_m) : usual_m_(usual_m) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    residuals[0] = usual_m_ * parameters[0][kSize - 1] - 1.0;
+    residuals[1] = 0.0;
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    std::fill_n(jacobians[0], 2 * kSize, 0.0);
+    jacobians[0][kSize - 1] = usual_m_;
+    return true;
+  }
+
+ private:
+  double usual_m_;
 };
 
 struct WindowLineObservation {
@@ -135,7 +158,8 @@ class Window {
   bool can_evaluate(const WindowPoint& point, const WindowObservation& observation) const;
   std::optional<Eigen::Vector2d> residual_of(const WindowPoint& point, const WindowObservation& observation,
                                              const Eigen::Vector3d& landmark) const;
-  bool depth_is_known(const WindowPoint& point) const;
+  bool tells_depth(const WindowPoint& point) const;
+  const ceres::CostFunction* usual_depth() const;
   void add_calibration(Built& built);
   void add_point_terms(WindowPoint& point, Built& built, const WindowFrame* only_of = nullptr);
   void add_line_terms(WindowLine& line, Built& built);
@@ -168,6 +192,8 @@ class Window {
   StateManifold state_manifold_;
   PoseManifold pose_manifold_;
   OrthonormalLineManifold line_manifold_;
+  UsualDepthFactor<kLandmarkSize> usual_depth_;
+  UsualDepthFactor<1> usual_depth_of_fixed_;
   std::unique_ptr<ceres::LossFunction> loss_;
   std::unique_ptr<ceres::LossFunction> doubtful_loss_;
 };
