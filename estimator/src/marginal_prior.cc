@@ -35,7 +35,7 @@ Eigen::VectorXd MarginalPrior::difference(double const* const* parameters) const
 // By the Cholesky factorisation with pivoting, which a singular matrix has too, of Lambda scaled to a unit diagonal:
 // S Lambda S = P^T L D L^T P.
 MarginalPriorFactor::MarginalPriorFactor(const MarginalPrior& prior) : prior_(prior) {
-  constexpr double kSingular = 1e-13;
+  constexpr double kSingular = 1e-16;
   const auto unit = [](double x) { return x > 0.0 ? std::sqrt(x) : 1.0; };
   const Eigen::VectorXd scale = prior.information.diagonal().unaryExpr(unit);
   const Eigen::VectorXd inverse = scale.cwiseInverse();
