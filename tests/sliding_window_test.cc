@@ -50,6 +50,9 @@ TEST(SlidingWindow, NoiseFreeErrorIsTheIntegratorsAndFallsWithItsOrder) {
 }
 
 TEST(SlidingWindow, NeesIsInsideItsBand) {
+#ifdef PLUMBLINE_SANITIZED
+  GTEST_SKIP() << "forty times what the other tests do";
+#endif
   testing::NeesOverTrials trials;
   for (std::uint64_t trial = 0; trial < 40; ++trial) {
     const auto s = sim::simulate(scenario(), {2, trial});
