@@ -228,7 +228,10 @@ void Window::fold_oldest() {
     parts.push_back(std::move(part));
     prior_values_.push_back(block.values);
   }
-  const Eigen::MatrixXd information = H(columns, columns);
+  Eigen::MatrixXd information = H(columns, columns);
+  // What rounding leaves of the directions that nothing is known of, in the gradient too, stays without weight.
+  constexpr double kRounding = 1e-12;
+  information.diagonal() *= 1.0 + kRounding;
   prior_ = std::make_unique<MarginalPrior>(
       MarginalPrior{std::move(parts), information.selfadjointView<Eigen::Lower>(), g(columns)});
   initial_.clear();
