@@ -65,7 +65,7 @@ class Bound : public ::testing::Test {
         .keyframes = every_second_frame(log()),
         .tracks = {}};
     input.tracks = estimator::collect_tracks(log().frames, input.keyframes, log().camera);
-    return *estimator::BatchProblem(input, true_values(input, simulation_.truth)).posterior_covariance();
+    return *estimator::BatchProblem(input, true_values(input, simulation_.truth)).covariance();
   }
   CramerRaoBound bound(BoundOptions options) const {
     options.frames = every_second_frame(log());

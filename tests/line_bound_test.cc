@@ -59,7 +59,7 @@ class LineBound : public ::testing::Test {
         .tracks = {}};
     input.line_tracks = estimator::collect_line_tracks(log.frames, input.keyframes, log.camera);
     EXPECT_GT(input.line_tracks.size(), 10U);
-    return *estimator::BatchProblem(input, true_values(input, s.truth)).posterior_covariance();
+    return *estimator::BatchProblem(input, true_values(input, s.truth)).covariance();
   }
   static CramerRaoBound bound(const sim::Simulation& s, BoundOptions options) {
     options.frames = every_second_frame(s.measurements);

@@ -93,7 +93,7 @@ TEST(SlidingWindow, TheSolversGiveTheSameAnswer) {
   estimator::EstimatorConfig config = online();
   const core::EstimateLog schur = estimator::estimate(s.measurements, config);
   const core::EstimateLog again = estimator::estimate(s.measurements, config);
-  config.solver = estimator::WindowSolver::kCeres;
+  config.solver = estimator::Solver::kCeres;
   const core::EstimateLog ceres = estimator::estimate(s.measurements, config);
   ASSERT_EQ(schur.status, core::SolveStatus::kConverged);
   ASSERT_EQ(ceres.status, core::SolveStatus::kConverged);

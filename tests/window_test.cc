@@ -57,13 +57,13 @@ Eigen::VectorXd difference(const ParameterBlock& block, const double* y, const d
 
 // Adds a step of `sigmas` standard deviations, as far as each column alone knows, to all blocks that stay.
 void disturb(const LeastSquares& problem, const estimator::SchurSystem& system, double sigmas, std::uint64_t draw) {
+  const Eigen::MatrixXd H = system.H();
   for (std::size_t b = 0; b < problem.blocks.size(); ++b) {
     const ParameterBlock& block = problem.blocks[b];
     if (block.eliminated || block.constant) continue;
     Eigen::VectorXd step(block.dof);
     for (int i = 0; i < block.dof; ++i) {
-      const double information =
-          system.H()(system.column(static_cast<int>(b)) + i, system.column(static_cast<int>(b)) + i);
+      const double information = H(system.column(static_cast<int>(b)) + i, system.column(static_cast<int>(b)) + i);
       step[i] = sigmas * kRandom.normal(draw, b * 16 + static_cast<std::uint64_t>(i)) / std::sqrt(information);
     }
     std::array<double, 16> moved;
@@ -152,7 +152,9 @@ TEST(WindowSolvers, AgreeOnEveryWindow) {
         }
         from += static_cast<std::size_t>(block.size);
       }
-      const double apart = std::sqrt(d.dot(system.H().selfadjointView<Eigen::Lower>() * d));
+      ASSERT_TRUE(system.build(0.0));
+      const Eigen::MatrixXd H = system.H();
+      const double apart = std::sqrt(d.dot(H.selfadjointView<Eigen::Lower>() * d));
       // Ceres ends where the costs of neighbours differ by their rounding: what it would still have to go.
       const auto left = [&](const std::vector<double>& values) {
         set_values(problem, values);
@@ -228,7 +230,7 @@ TEST(SlidingWindow, BeforeAnythingLeavesItIsTheBatch) {
   config.window.keyframes = 1000;
   config.window.keyframe_parallax_px = 0.0;
   config.window.largest_depth_sigma = 1e6;  // the batch has no belief of depths
-  for (const auto solver : {estimator::WindowSolver::kSchur, estimator::WindowSolver::kCeres}) {
+  for (const auto solver : {estimator::Solver::kSchur, estimator::Solver::kCeres}) {
     config.solver = solver;
     const core::EstimateLog online = estimator::estimate(s.measurements, config);
     ASSERT_EQ(batch.status, core::SolveStatus::kConverged);

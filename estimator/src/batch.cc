@@ -153,9 +153,9 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
       result.reason = fmt::format("final cost {:.3g} per degree of freedom, above estimator.max_cost_per_dof = {}",
                                   outcome.summary.cost_per_dof(), config.max_cost_per_dof);
     } else if (result.status != core::SolveStatus::kConverged) {
-      result.reason = fmt::format("Ceres stopped after {} iterations at cost {:.6g}", outcome.summary.iterations,
+      result.reason = fmt::format("stopped after {} iterations at cost {:.6g}", outcome.summary.iterations,
                                   outcome.summary.final_cost);
-    } else if (const auto covariance = problem.posterior_covariance()) {
+    } else if (const auto covariance = problem.covariance()) {
       result.covariance = *covariance;
     } else {
       result.status = core::SolveStatus::kDiverged;

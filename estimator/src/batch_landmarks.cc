@@ -1,6 +1,5 @@
 // The visual half of the batch problem: points, then lines.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -49,42 +48,45 @@ void BatchProblem::add_points(const Timings& timings) {
 }
 
 // False, and nothing added, where a factor cannot be evaluated.
+bool BatchProblem::add_landmark(ParameterBlock landmark, std::vector<Term> terms) {
+  landmark.eliminated = true;
+  const int block = add_block(landmark);
+  for (Term& term : terms) {
+    term.blocks.push_back(block);
+    Eigen::Vector2d residual;
+    ResidualTerm candidate{.factor = term.factor.get(), .count = static_cast<int>(term.blocks.size())};
+    std::copy(term.blocks.begin(), term.blocks.end(), candidate.blocks.begin());
+    if (!evaluate(problem_, candidate, residual.data())) {
+      problem_.blocks.pop_back();
+      return false;
+    }
+  }
+  for (Term& term : terms) add_term(std::move(term), loss_.get());
+  observations_ += static_cast<int>(terms.size());
+  return true;
+}
+
 bool BatchProblem::add_point(const PointModel& model, const Timings& timings, const Track& track,
                              Eigen::Vector3d& landmark) {
   const auto view = [&](const TrackObservation& o) -> PointView { return {timings[o.keyframe], o.pixel, o.velocity}; };
   const TrackObservation& first = track.observations.front();
   const PointView anchor = view(first);
-  double* const landmark_values = landmark_block(landmark);
-  const auto blocks = [&](std::size_t keyframe) -> std::vector<double*> {
-    return {states_[first.keyframe + 1].data(),
-            states_[keyframe + 1].data(),
-            extrinsics_.data(),
-            &td_s_,
-            &readout_s_,
-            landmark_values};
-  };
-
-  std::vector<std::pair<std::unique_ptr<ceres::CostFunction>, std::size_t>> factors;
+  std::vector<Term> terms;
+  if (auto factor = make_anchor_factor(model, anchor)) {
+    std::vector<int> blocks;
+    if (model.timing == TimingModel::kFeatureVelocity) blocks = {td_block_, readout_block_};
+    terms.push_back({std::move(factor), std::move(blocks)});
+  }
+  const std::size_t of_anchor = terms.size();
   for (auto o = track.observations.begin() + 1; o != track.observations.end() && o->keyframe < timings.size(); ++o) {
-    auto factor = make_point_factor(model, anchor, view(*o));
-    Eigen::Vector2d residual;
-    if (!factor->Evaluate(blocks(o->keyframe).data(), residual.data(), nullptr)) return false;
-    factors.emplace_back(std::move(factor), o->keyframe);
+    terms.push_back(
+        {make_point_factor(model, anchor, view(*o)),
+         {state_block(first.keyframe), state_block(o->keyframe), extrinsics_block_, td_block_, readout_block_}});
   }
-  if (factors.empty()) return false;
-  if (auto term = make_anchor_term(model, anchor, &td_s_, &readout_s_, landmark_values)) {
-    problem_->AddResidualBlock(term->factor.release(), loss_.get(), term->blocks);
-    ++observations_;
-  }
-  observations_ += static_cast<int>(factors.size());
-  for (auto& [factor, keyframe] : factors) {
-    problem_->AddResidualBlock(factor.release(), loss_.get(), blocks(keyframe));
-  }
-  return true;
-}
-
-double* BatchProblem::landmark_block(Eigen::Vector3d& landmark) const {
-  return input_.config.landmark == LandmarkType::kFixedBearing ? &landmark.z() : landmark.data();
+  if (terms.size() == of_anchor) return false;
+  const bool fixed = model.landmark == LandmarkType::kFixedBearing;
+  const int size = fixed ? 1 : kLandmarkSize;
+  return add_landmark({.values = fixed ? &landmark.z() : landmark.data(), .size = size, .dof = size}, std::move(terms));
 }
 
 void BatchProblem::add_lines(const Timings& timings) {
@@ -105,38 +107,30 @@ void BatchProblem::add_lines(const Timings& timings) {
   }
 }
 
-// False, and nothing added, where a factor cannot be evaluated, or where the line has two views: their four rows are
-// spent on its four degrees of freedom and say nothing of the motion, but the solver would follow them to infinity.
+// Nor is a line added that has two views: their four rows are spent on its four degrees of freedom and say nothing of
+// the motion, but the solver would follow them to infinity.
 bool BatchProblem::add_line(const LineModel& model, const Timings& timings, std::size_t track, LineValue& line) {
   constexpr std::size_t kLeastViews = 3;
-  const auto blocks = [&](std::size_t keyframe) -> std::vector<double*> {
-    return {states_[keyframe + 1].data(), extrinsics_.data(), &td_s_, &readout_s_, line.block.data()};
-  };
-  std::vector<std::pair<std::unique_ptr<ceres::CostFunction>, std::size_t>> factors;
+  std::vector<Term> terms;
   for (const LineTrackObservation& o : input_.line_tracks[track].observations) {
     if (o.keyframe >= timings.size()) break;
-    auto factor = make_line_factor(model, {timings[o.keyframe], o.ends_px, o.velocities}, line.origin_W);
-    Eigen::Vector2d residual;
-    if (!factor->Evaluate(blocks(o.keyframe).data(), residual.data(), nullptr)) return false;
-    factors.emplace_back(std::move(factor), o.keyframe);
+    terms.push_back({make_line_factor(model, {timings[o.keyframe], o.ends_px, o.velocities}, line.origin_W),
+                     {state_block(o.keyframe), extrinsics_block_, td_block_, readout_block_}});
   }
-  if (factors.size() < kLeastViews) return false;
-  problem_->AddParameterBlock(line.block.data(), kLineSize, &line_manifold_);
-  for (auto& [factor, keyframe] : factors) {
-    const auto id = problem_->AddResidualBlock(factor.release(), loss_.get(), blocks(keyframe));
-    line_residuals_.push_back({track, id});
-  }
-  observations_ += static_cast<int>(factors.size());
-  return true;
+  return terms.size() >= kLeastViews &&
+         add_landmark({.values = line.block.data(), .size = kLineSize, .dof = kLineDof, .manifold = &line_manifold_},
+                      std::move(terms));
 }
 
 std::vector<std::size_t> BatchProblem::lines_beyond(double sigmas) const {
   std::vector<std::size_t> tracks;
-  for (const auto& [track, block] : line_residuals_) {
-    if (!tracks.empty() && tracks.back() == track) continue;
+  for (std::size_t t = line_begin_; t < inertial_begin_; ++t) {
+    const ResidualTerm& term = problem_.terms[t];
+    const std::size_t line = static_cast<std::size_t>(eliminated_block(problem_, term) - first_line_block_);
+    if (!tracks.empty() && tracks.back() == line_tracks_[line]) continue;
     Eigen::Vector2d residual;
-    const bool known = problem_->EvaluateResidualBlock(block, false, nullptr, residual.data(), nullptr);
-    if (!known || !(residual.cwiseAbs().maxCoeff() <= sigmas)) tracks.push_back(track);
+    const bool known = evaluate(problem_, term, residual.data());
+    if (!known || !(residual.cwiseAbs().maxCoeff() <= sigmas)) tracks.push_back(line_tracks_[line]);
   }
   return tracks;
 }

@@ -62,11 +62,7 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
            "`bearing_inverse_depth`: 3 dof; `fixed_bearing`: inverse depth only, the anchor's observation taken as "
            "exact, for comparison");
   v.choice("initialisation", c.initialisation, kInitialisationNames, "`prior`: starts from the scenario's prior");
-  v.choice("solver", c.solver, kWindowSolverNames,
-           "of `sliding_window`; `schur`: our own normal equations; `ceres`: the reference, slower");
-  v.choice(
-      "linear_solver", c.linear_solver, kLinearSolverNames,
-      "of Ceres in `batch`, for the states once the landmarks are eliminated; `automatic`: dense up to 3000 unknowns");
+  v.choice("solver", c.solver, kSolverNames, "`schur`: our own normal equations; `ceres`: the reference, slower");
   v.value("keyframe_rate_hz", c.keyframe_rate_hz, core::positive_up_to(core::kMostFrequencyHz),
           "only keyframes' observations enter");
   v.value("pixel_sigma_px", c.pixel_sigma_px, sigma_up_to(core::kMostPixels), "scenario", "pixel noise it believes in");

@@ -9,6 +9,22 @@
 
 namespace plumbline::estimator {
 
+int eliminated_block(const LeastSquares& problem, const ResidualTerm& term) {
+  for (int b = 0; b < term.count; ++b) {
+    const int block = term.blocks[static_cast<std::size_t>(b)];
+    if (problem.blocks[static_cast<std::size_t>(block)].eliminated) return block;
+  }
+  return -1;
+}
+
+bool evaluate(const LeastSquares& problem, const ResidualTerm& term, double* residuals) {
+  std::array<const double*, 6> parameters = {};
+  for (std::size_t b = 0; b < static_cast<std::size_t>(term.count); ++b) {
+    parameters[b] = problem.blocks[static_cast<std::size_t>(term.blocks[b])].values;
+  }
+  return term.factor->Evaluate(parameters.data(), residuals, nullptr);
+}
+
 LeastSquaresResult solve_with_ceres(const LeastSquares& problem, const LeastSquaresOptions& options) {
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -17,10 +33,17 @@ LeastSquaresResult solve_with_ceres(const LeastSquares& problem, const LeastSqua
   ownership.disable_all_safety_checks = true;
   ceres::Problem ceres_problem(ownership);
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  auto landmarks = std::make_shared<ceres::ParameterBlockOrdering>();
+  int columns = 0;  // that are not eliminated
   for (const ParameterBlock& block : problem.blocks) {
     ceres_problem.AddParameterBlock(block.values, block.size, const_cast<ceres::Manifold*>(block.manifold));
     if (block.constant) ceres_problem.SetParameterBlockConstant(block.values);
     ordering->AddElementToGroup(block.values, block.eliminated ? 0 : 1);
+    if (block.eliminated) {
+      landmarks->AddElementToGroup(block.values, 0);
+    } else {
+      columns += block.dof;
+    }
   }
   const auto values = [&](int block) { return problem.blocks[static_cast<std::size_t>(block)].values; };
   std::vector<double*> parameters;
@@ -40,14 +63,20 @@ LeastSquaresResult solve_with_ceres(const LeastSquares& problem, const LeastSqua
   const double cost_from = prior ? prior->cost_at_zero() : 0.0;
 
   ceres::Solver::Options ceres_options;
-  ceres_options.linear_solver_type = ceres::DENSE_SCHUR;
+  // Tracks of seconds leave few zeros between the states of a short recording, and dense Cholesky has less to keep
+  // books of.
+  constexpr int kDenseUpTo = 3000;
+  ceres_options.linear_solver_type = columns <= kDenseUpTo ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   ceres_options.dense_linear_algebra_library_type = ceres::LAPACK;
+  ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  ceres_options.use_inner_iterations = options.settle_landmarks && landmarks->NumElements() > 0;
+  ceres_options.inner_iteration_ordering = landmarks;
   ceres_options.linear_solver_ordering = ordering;
   ceres_options.num_threads = 1;
   ceres_options.max_num_iterations = options.max_iterations;
   ceres_options.max_solver_time_in_seconds = 1e9;  // never: a result must not depend on the machine's load
   // A step of length s, in standard deviations, lowers the cost by s^2/2.
-  ceres_options.function_tolerance = 0.0;
+  ceres_options.function_tolerance = options.cost_tolerance;
   ceres_options.gradient_tolerance = 0.0;
   ceres_options.parameter_tolerance = 0.0;
   ceres_options.initial_trust_region_radius = 1e12;

@@ -37,15 +37,12 @@ std::unique_ptr<ceres::CostFunction> make_point_factor(const PointModel& model, 
                                                    anchor.pixel);
 }
 
-std::optional<AnchorTerm> make_anchor_term(const PointModel& model, const PointView& anchor, double* td_s,
-                                           double* readout_s, double* landmark) {
-  if (model.landmark == LandmarkType::kFixedBearing) return std::nullopt;
+std::unique_ptr<ceres::CostFunction> make_anchor_factor(const PointModel& model, const PointView& anchor) {
+  if (model.landmark == LandmarkType::kFixedBearing) return nullptr;
   if (model.timing == TimingModel::kFeatureVelocity) {
-    return AnchorTerm{
-        std::make_unique<FeatureVelocityAnchor>(chart_of(model.camera, anchor), moving(model.camera, anchor)),
-        {td_s, readout_s, landmark}};
+    return std::make_unique<FeatureVelocityAnchor>(chart_of(model.camera, anchor), moving(model.camera, anchor));
   }
-  return AnchorTerm{std::make_unique<AnchorPointFactor>(model.camera, anchor.pixel), {landmark}};
+  return std::make_unique<AnchorPointFactor>(model.camera, anchor.pixel);
 }
 
 }  // namespace plumbline::estimator

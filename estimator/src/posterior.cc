@@ -1,36 +1,34 @@
 #include "estimator/posterior.h"
 
-#include <Eigen/CholmodSupport>
-#include <Eigen/SparseCore>
-#include <ceres/crs_matrix.h>
+#include <Eigen/Core>
 
 namespace plumbline::estimator {
 
-std::optional<Eigen::MatrixXd> leading_covariance(ceres::Problem& problem, const std::vector<double*>& blocks,
-                                                  int leading) {
-  ceres::Problem::EvaluateOptions options;
-  options.parameter_blocks = blocks;
-  options.num_threads = 1;
-  ceres::CRSMatrix crs;
-  if (!problem.Evaluate(options, nullptr, nullptr, nullptr, &crs)) return std::nullopt;
-
-  using RowMajor = Eigen::SparseMatrix<double, Eigen::RowMajor, int>;
-  const Eigen::Map<const RowMajor> J(crs.num_rows, crs.num_cols, static_cast<Eigen::Index>(crs.values.size()),
-                                     crs.rows.data(), crs.cols.data(), crs.values.data());
-  Eigen::VectorXd scale = Eigen::VectorXd::Zero(crs.num_cols);
-  for (std::size_t i = 0; i < crs.values.size(); ++i) scale[crs.cols[i]] += crs.values[i] * crs.values[i];
-  if (!(scale.minCoeff() > 0.0)) return std::nullopt;
-  scale = scale.cwiseSqrt().cwiseInverse();
-  const Eigen::SparseMatrix<double> J_scaled = J * scale.asDiagonal();
-  const Eigen::SparseMatrix<double> information = J_scaled.transpose() * J_scaled;
-
-  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> solver(information);
-  if (solver.info() != Eigen::Success) return std::nullopt;
-  const Eigen::MatrixXd columns = solver.solve(Eigen::MatrixXd::Identity(crs.num_cols, leading));
-  const auto D = scale.head(leading).asDiagonal();
-  const Eigen::MatrixXd covariance = D * columns.topRows(leading) * D;
+std::optional<core::PosteriorCovariance> posterior_covariance(SchurSystem& system, const EstimateWhat& free) {
+  if (!system.solved_undamped() && !(system.build(0.0) && system.solve())) return std::nullopt;
+  // L = [ L11 0; L21 L22 ], so that the last rows and columns of (L L^T)^-1 are (L22 L22^T)^-1.
+  constexpr int kCalibration = core::kCovLastState;
+  const Eigen::MatrixXd L = system.trailing_factor(core::kCovDim);
+  const Eigen::MatrixXd inverse =
+      L.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(core::kCovDim, core::kCovDim));
+  const Eigen::MatrixXd P = inverse.transpose() * inverse;
+  core::PosteriorCovariance covariance;
+  covariance.bottomRightCorner<core::kStateDof, core::kStateDof>() =
+      P.topLeftCorner<core::kStateDof, core::kStateDof>();
+  covariance.topLeftCorner<kCalibration, kCalibration>() = P.bottomRightCorner<kCalibration, kCalibration>();
+  covariance.bottomLeftCorner<core::kStateDof, kCalibration>() = P.topRightCorner<core::kStateDof, kCalibration>();
+  covariance.topRightCorner<kCalibration, core::kStateDof>() =
+      covariance.bottomLeftCorner<core::kStateDof, kCalibration>().transpose();
+  const auto hold = [&](int first, int count, bool is_free) {
+    if (is_free) return;
+    covariance.middleRows(first, count).setZero();
+    covariance.middleCols(first, count).setZero();
+  };
+  hold(core::kCovExtrinsicPosition, 6, free.extrinsics);
+  hold(core::kCovTd, 1, free.td);
+  hold(core::kCovReadout, 1, free.readout);
   if (!covariance.allFinite()) return std::nullopt;
-  return Eigen::MatrixXd(0.5 * (covariance + covariance.transpose()));
+  return covariance;
 }
 
 }  // namespace plumbline::estimator

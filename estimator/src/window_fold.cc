@@ -155,7 +155,8 @@ void Window::fold_oldest() {
 
   SchurSystem system(built.problem);
   if (!system.build(0.0)) throw std::domain_error("fold: a factor cannot be evaluated");
-  Eigen::MatrixXd H = system.H().selfadjointView<Eigen::Lower>();
+  const Eigen::MatrixXd lower = system.H();
+  Eigen::MatrixXd H = lower.selfadjointView<Eigen::Lower>();
   Eigen::VectorXd g = system.g();
   const auto column_of = [&](const double* values) { return system.column(built.of(values)); };
   for (const auto& frame : frames_) {

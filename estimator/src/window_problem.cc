@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "estimator/posterior.h"
 #include "estimator/schur_system.h"
 #include "estimator/window.h"
 #include "window_built.h"
@@ -136,39 +137,15 @@ WindowSolution Window::solve(bool doubtful) {
   const LeastSquaresOptions options{.max_iterations = config_.max_iterations, .step_tolerance = 0.5};
   SchurSystem system(built.problem);
   WindowSolution solution;
-  bool factored = true;
-  if (config_.solver == WindowSolver::kSchur) {
+  if (config_.solver == Solver::kSchur) {
     solution.result = solve_with_schur(built.problem, options, system);
   } else {
     solution.result = solve_with_ceres(built.problem, options);
-    factored = solution.result.status != core::SolveStatus::kDiverged && system.build(0.0) && system.solve();
   }
   solution.observations = static_cast<int>(built.visual_terms);
-  if (doubtful || solution.result.status == core::SolveStatus::kDiverged || !factored) return solution;
+  if (doubtful || solution.result.status == core::SolveStatus::kDiverged) return solution;
 
-  // L = [ L11 0; L21 L22 ], so that the last rows and columns of (L L^T)^-1 are (L22 L22^T)^-1. The newest state stands
-  // before the calibration there.
-  constexpr int kCalibration = core::kCovLastState;
-  const Eigen::MatrixXd L = system.factor().bottomRightCorner<core::kCovDim, core::kCovDim>();
-  const Eigen::MatrixXd inverse =
-      L.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(core::kCovDim, core::kCovDim));
-  const Eigen::MatrixXd P = inverse.transpose() * inverse;
-  core::PosteriorCovariance covariance;
-  covariance.bottomRightCorner<core::kStateDof, core::kStateDof>() =
-      P.topLeftCorner<core::kStateDof, core::kStateDof>();
-  covariance.topLeftCorner<kCalibration, kCalibration>() = P.bottomRightCorner<kCalibration, kCalibration>();
-  covariance.bottomLeftCorner<core::kStateDof, kCalibration>() = P.topRightCorner<core::kStateDof, kCalibration>();
-  covariance.topRightCorner<kCalibration, core::kStateDof>() =
-      covariance.bottomLeftCorner<core::kStateDof, kCalibration>().transpose();
-  const auto hold = [&](int first, int count, bool free) {
-    if (free) return;
-    covariance.middleRows(first, count).setZero();
-    covariance.middleCols(first, count).setZero();
-  };
-  hold(core::kCovExtrinsicPosition, 6, config_.estimate.extrinsics);
-  hold(core::kCovTd, 1, config_.estimate.td);
-  hold(core::kCovReadout, 1, config_.estimate.readout);
-  if (covariance.allFinite()) solution.covariance = covariance;
+  solution.covariance = posterior_covariance(system, config_.estimate);
   return solution;
 }
 
@@ -176,17 +153,12 @@ WindowFit Window::assess(bool reject) {
   WindowFit fit;
   const double limit = config_.window.outlier_sigma * config_.window.outlier_sigma;
   const Built built = build_all();
-  std::array<const double*, 6> parameters = {};
   std::set<const ceres::CostFunction*> outliers;
   for (std::size_t t = 0; t < built.visual_terms; ++t) {
     const ResidualTerm& term = built.problem.terms[t];
     if (term.factor == usual_depth()) continue;
-    for (int b = 0; b < term.count; ++b) {
-      const auto i = static_cast<std::size_t>(b);
-      parameters[i] = built.problem.blocks[static_cast<std::size_t>(term.blocks[i])].values;
-    }
     Eigen::Vector2d residual;
-    const bool known = term.factor->Evaluate(parameters.data(), residual.data(), nullptr);
+    const bool known = evaluate(built.problem, term, residual.data());
     const double squares = residual.squaredNorm();
     if (!known || !(squares <= limit)) {
       outliers.insert(term.factor);

@@ -1,4 +1,4 @@
-// The least-squares problem of a batch estimate: parameter blocks, factors, and the ceres::Problem that joins them.
+// The least-squares problem of a batch estimate: parameter blocks and the factors that join them.
 #pragma once
 
 #include <memory>
@@ -6,14 +6,16 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <ceres/cost_function.h>
 #include <ceres/loss_function.h>
-#include <ceres/problem.h>
 
 #include "core/estimate.h"
 #include "estimator/batch_values.h"
 #include "estimator/factors/parameter_blocks.h"
+#include "estimator/least_squares.h"
 #include "estimator/line_terms.h"
 #include "estimator/point_terms.h"
+#include "estimator/schur_system.h"
 
 namespace plumbline::estimator {
 
@@ -42,7 +44,7 @@ class BatchProblem {
   BatchValues values() const;
 
   // Of calibration and last state, at the present values.
-  std::optional<core::PosteriorCovariance> posterior_covariance() const;
+  std::optional<core::PosteriorCovariance> covariance();
 
   // The tracks of lines that an observed end is further from than so many sigmas, at the present values.
   std::vector<std::size_t> lines_beyond(double sigmas) const;
@@ -50,15 +52,23 @@ class BatchProblem {
  private:
   using Timings = std::vector<FrameTiming>;  // of the keyframes
 
-  // Of the residual blocks [first, last) in the order in which they were added, without loss functions.
-  core::ResidualSum residual_sum(int first, int last) const;
+  // Of the terms [first, last), without loss functions.
+  core::ResidualSum residual_sum(std::size_t first, std::size_t last) const;
 
+  // A factor and the blocks it speaks of, the landmark's left out where it comes last.
+  struct Term {
+    std::unique_ptr<const ceres::CostFunction> factor;
+    std::vector<int> blocks;
+  };
+  int add_block(ParameterBlock block);
+  void add_term(Term term, const ceres::LossFunction* loss);
+  bool add_landmark(ParameterBlock landmark, std::vector<Term> terms);
+  int state_block(std::size_t keyframe) const { return static_cast<int>(keyframe + 1); }
   void add_priors();
   void add_inertial_factors();
   Timings frame_timings() const;
   void add_points(const Timings& timings);
   bool add_point(const PointModel& model, const Timings& timings, const Track& track, Eigen::Vector3d& landmark);
-  double* landmark_block(Eigen::Vector3d& landmark) const;  // what of it is estimated
   void add_lines(const Timings& timings);
   bool add_line(const LineModel& model, const Timings& timings, std::size_t track, LineValue& line);
 
@@ -73,19 +83,22 @@ class BatchProblem {
   std::vector<std::size_t> landmark_tracks_;
   std::vector<LineValue> lines_;
   std::vector<std::size_t> line_tracks_;
-  struct LineResidual {
-    std::size_t track;
-    ceres::ResidualBlockId block;
-  };
-  std::vector<LineResidual> line_residuals_;
   int observations_ = 0;
-  int inertial_begin_ = 0;  // the residual blocks: priors, then inertial, then visual ones
-  int visual_begin_ = 0;
+  // The terms: those of points, of lines, inertial ones, priors.
+  std::size_t line_begin_ = 0;
+  std::size_t inertial_begin_ = 0;
+  std::size_t prior_begin_ = 0;
   StateManifold state_manifold_;
   PoseManifold pose_manifold_;
   OrthonormalLineManifold line_manifold_;
-  std::unique_ptr<ceres::LossFunction> loss_;  // of visual residuals; null: none
-  std::unique_ptr<ceres::Problem> problem_;
+  std::unique_ptr<ceres::LossFunction> loss_;                        // of visual residuals; null: none
+  std::vector<std::unique_ptr<const ceres::CostFunction>> factors_;  // of the terms
+  int extrinsics_block_ = -1;
+  int td_block_ = -1;
+  int readout_block_ = -1;
+  int first_line_block_ = 0;
+  LeastSquares problem_;
+  std::optional<SchurSystem> system_;
 };
 
 }  // namespace plumbline::estimator

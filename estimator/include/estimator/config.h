@@ -18,10 +18,8 @@ enum class TimingModel { kPropagated, kFeatureVelocity };
 inline constexpr std::array<std::string_view, 2> kTimingModelNames = {"propagated", "feature_velocity"};
 enum class Initialisation { kPrior };
 inline constexpr std::array<std::string_view, 1> kInitialisationNames = {"prior"};
-enum class LinearSolver { kAutomatic, kSparseSchur, kDenseSchur };
-inline constexpr std::array<std::string_view, 3> kLinearSolverNames = {"automatic", "sparse_schur", "dense_schur"};
-enum class WindowSolver { kSchur, kCeres };
-inline constexpr std::array<std::string_view, 2> kWindowSolverNames = {"schur", "ceres"};
+enum class Solver { kSchur, kCeres };
+inline constexpr std::array<std::string_view, 2> kSolverNames = {"schur", "ceres"};
 enum class RobustLoss { kNone, kHuber, kCauchy };
 inline constexpr std::array<std::string_view, 3> kRobustLossNames = {"none", "huber", "cauchy"};
 
@@ -71,8 +69,7 @@ struct EstimatorConfig {
   ResidualType residual = ResidualType::kPinhole;
   LandmarkType landmark = LandmarkType::kBearingInverseDepth;
   Initialisation initialisation = Initialisation::kPrior;
-  WindowSolver solver = WindowSolver::kSchur;
-  LinearSolver linear_solver = LinearSolver::kAutomatic;
+  Solver solver = Solver::kSchur;
   double keyframe_rate_hz = 10.0;
   std::optional<double> pixel_sigma_px;
   std::optional<double> line_sigma_px;

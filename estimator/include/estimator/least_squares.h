@@ -1,4 +1,4 @@
-// A window's least-squares problem, and the two ways to solve it:
+// The least-squares problem of an estimate, and the two ways to solve it:
 //   min  |r_prior|^2/2 + sum_i rho(|r_i|^2)/2
 // over parameter blocks of which some, the landmarks, meet each other in no term: they are eliminated first (Schur
 // complement). Ceres is the reference; `schur` does the same with less bookkeeping (schur_system.h).
@@ -44,10 +44,20 @@ struct LeastSquares {
   std::vector<int> prior_blocks;  // of its parts
 };
 
+// The eliminated block that a term is of; -1 where there is none.
+int eliminated_block(const LeastSquares& problem, const ResidualTerm& term);
+
+// The residuals of a term at the present values, without its loss. False where it cannot be evaluated.
+bool evaluate(const LeastSquares& problem, const ResidualTerm& term, double* residuals);
+
 struct LeastSquaresOptions {
   int max_iterations = 50;
   // The last step's length in standard deviations, |delta|_H: what is left is about its square.
   double step_tolerance = 1e-2;
+  // A step that lowers the cost by less than this share of it is the last, too.
+  double cost_tolerance = 0.0;
+  // Whether every step is followed by the landmarks' own best values for its poses (variable projection).
+  bool settle_landmarks = false;
 };
 
 struct LeastSquaresResult {

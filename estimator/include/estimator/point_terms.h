@@ -3,11 +3,9 @@
 
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include <Eigen/Core>
 #include <ceres/cost_function.h>
-#include <ceres/problem.h>
 
 #include "estimator/config.h"
 #include "estimator/factors/point_factors.h"
@@ -32,12 +30,8 @@ struct PointModel {
 std::unique_ptr<ceres::CostFunction> make_point_factor(const PointModel& model, const PointView& anchor,
                                                        const PointView& observer);
 
-// The anchor's own observation; nothing where it is taken as exact.
-struct AnchorTerm {
-  std::unique_ptr<ceres::CostFunction> factor;
-  std::vector<double*> blocks;
-};
-std::optional<AnchorTerm> make_anchor_term(const PointModel& model, const PointView& anchor, double* td_s,
-                                           double* readout_s, double* landmark);
+// The anchor's own observation; null where it is taken as exact. Blocks: td, readout (with `feature_velocity` only),
+// landmark.
+std::unique_ptr<ceres::CostFunction> make_anchor_factor(const PointModel& model, const PointView& anchor);
 
 }  // namespace plumbline::estimator

@@ -1,19 +1,18 @@
-// Marginal covariance of a least-squares problem: the leading block of (J^T J)^-1 at the present values, J the
-// whitened Jacobian on the tangent spaces, weighted by the loss functions where there are any.
+// Marginal covariance of calibration and newest state: their block of the inverse information at the present values,
+// landmarks and earlier states taken out.
 #pragma once
 
 #include <optional>
-#include <vector>
 
-#include <Eigen/Core>
-#include <ceres/problem.h>
+#include "core/estimate.h"
+#include "estimator/config.h"
+#include "estimator/schur_system.h"
 
 namespace plumbline::estimator {
 
-// Of the first `leading` columns of J in the order of `blocks`, which are all free blocks of the problem. By sparse
-// Cholesky of the information, scaled to unit diagonal, with as many back-substitutions as columns asked for. Nothing
-// where the information is singular.
-std::optional<Eigen::MatrixXd> leading_covariance(ceres::Problem& problem, const std::vector<double*>& blocks,
-                                                  int leading);
+// Of a system whose last columns are the newest state's and then the calibration's; built and solved anew unless its
+// last solve was undamped, for then all but the last, short step is in it. What is held has zeros. Nothing where the
+// information is singular.
+std::optional<core::PosteriorCovariance> posterior_covariance(SchurSystem& system, const EstimateWhat& free);
 
 }  // namespace plumbline::estimator
