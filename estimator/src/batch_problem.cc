@@ -22,7 +22,7 @@ constexpr int kSearchIterations = 30;
 // Of the cost.
 constexpr double kSearchTolerance = 1e-3;
 // In standard deviations, of all unknowns together.
-constexpr double kStepTolerance = 1e-3;
+constexpr double kStepTolerance = 1e-2;
 
 }  // namespace
 
@@ -110,7 +110,7 @@ BatchProblem::Outcome BatchProblem::solve() {
   const LeastSquaresOptions options{.max_iterations = search ? kSearchIterations : input_.config.max_iterations,
                                     .step_tolerance = kStepTolerance,
                                     .cost_tolerance = search ? kSearchTolerance : 0.0,
-                                    .settle_landmarks = search || !lines_.empty()};
+                                    .settle_landmarks = true};
   LeastSquaresResult result;
   if (input_.config.solver == Solver::kSchur) {
     result = solve_with_schur(problem_, options, system_.emplace(problem_));

@@ -34,7 +34,7 @@ BorderedBand::BorderedBand(std::vector<int> reach, int border)
     deepest = std::max(deepest, r - j / kPanel * kPanel);
   }
   height_ = kMostAbove + deepest;
-  band_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(height_) * banded_ + kMostAbove);
+  band_.resize(static_cast<Eigen::Index>(height_) * banded_ + kMostAbove);
 }
 
 double* BorderedBand::at(int row, int col) {

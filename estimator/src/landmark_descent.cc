@@ -15,11 +15,13 @@ namespace {
 
 constexpr int kMostSize = kLineSize;
 constexpr int kMostIterations = 10;
-constexpr double kShortStep2 = 1e-4;  // in variances
+constexpr double kShortStep2 = 1e-2;  // in variances
 constexpr double kFirstDamping = 1e-4;
 constexpr double kLargestDamping = 1e4;
 
 using Values = std::array<double, kMostSize>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kLineDof, kLineDof>;
+using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kLineDof, 1>;
 
 class Descent {
  public:
@@ -30,31 +32,33 @@ class Descent {
         terms_(terms) {}
 
   void run(const double* before) {
-    const Values present = values();
-    std::optional<double> cost = sum(false);
-    set(before);
-    const std::optional<double> cost_before = sum(false);
-    if (cost && !(cost_before && *cost_before < *cost)) {
-      set(present.data());
-    } else if (cost_before) {
-      cost = cost_before;
-    } else {
-      set(present.data());
-      return;
+    std::optional<double> cost = sum();
+    if (!cost) {
+      const Values present = values();
+      set(before);
+      cost = sum();
+      if (!cost) {
+        set(present.data());
+        return;
+      }
     }
     double damping = 0.0;
     for (int i = 0; i < kMostIterations; ++i) {
-      if (!sum(true)) return;
       const Values from = values();
+      const Square V = V_;
+      const Column h = h_;
       bool moved = false;
       while (!moved && damping <= kLargestDamping) {
-        const std::optional<double> length2 = step(from, damping);
-        const std::optional<double> next = length2 ? sum(false) : std::nullopt;
+        const std::optional<double> length2 = step(from, V, h, damping);
+        if (damping == 0.0 && length2 && *length2 < kShortStep2) {
+          set(from.data());
+          return;
+        }
+        const std::optional<double> next = length2 ? sum() : std::nullopt;
         moved = next && *next <= *cost;
         if (moved) {
           cost = next;
-          if (*length2 < kShortStep2) return;
-          damping *= 0.1;
+          damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
         } else {
           set(from.data());
           damping = std::max(kFirstDamping, 10.0 * damping);
@@ -72,13 +76,11 @@ class Descent {
   }
   void set(const double* x) const { std::copy_n(x, block_.size, block_.values); }
 
-  // The landmark's share of the cost, with its normal equations where they are asked for.
-  std::optional<double> sum(bool derive) {
+  // The landmark's share of the cost, and its normal equations.
+  std::optional<double> sum() {
     double cost = 0.0;
-    if (derive) {
-      V_.setZero(block_.dof, block_.dof);
-      h_.setZero(block_.dof);
-    }
+    V_.setZero(block_.dof, block_.dof);
+    h_.setZero(block_.dof);
     for (const ResidualTerm& term : terms_) {
       std::array<const double*, 6> parameters = {};
       std::array<double*, 6> jacobians = {};
@@ -86,14 +88,13 @@ class Descent {
       for (int b = 0; b < term.count; ++b) {
         const auto i = static_cast<std::size_t>(b);
         parameters[i] = problem_.blocks[static_cast<std::size_t>(term.blocks[i])].values;
-        if (derive && term.blocks[i] == landmark_) jacobians[i] = ambient.data();
+        if (term.blocks[i] == landmark_) jacobians[i] = ambient.data();
       }
       Eigen::Vector2d r;
-      if (!term.factor->Evaluate(parameters.data(), r.data(), derive ? jacobians.data() : nullptr)) return std::nullopt;
+      if (!term.factor->Evaluate(parameters.data(), r.data(), jacobians.data())) return std::nullopt;
       std::array<double, 3> rho = {r.squaredNorm(), 1.0, 0.0};
       if (term.loss != nullptr) term.loss->Evaluate(r.squaredNorm(), rho.data());
       cost += 0.5 * rho[0];
-      if (!derive) continue;
       Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, kMostSize> E(2, block_.dof);
       if (block_.manifold == nullptr) {
         E = Eigen::Map<const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>>(ambient.data(), 2, block_.dof);
@@ -107,22 +108,18 @@ class Descent {
   }
 
   // A damped step from `from`; its squared length in the damped information.
-  std::optional<double> step(const Values& from, double damping) const {
-    Square V = V_;
+  std::optional<double> step(const Values& from, Square V, const Column& h, double damping) const {
     V.diagonal() *= 1.0 + damping;
     const Eigen::LLT<Square> llt(V);
     if (llt.info() != Eigen::Success) return std::nullopt;
-    const Column delta = -llt.solve(h_);
+    const Column delta = -llt.solve(h);
     if (block_.manifold == nullptr) {
       for (int i = 0; i < block_.size; ++i) block_.values[i] = from[static_cast<std::size_t>(i)] + delta[i];
     } else {
       block_.manifold->Plus(from.data(), delta.data(), block_.values);
     }
-    return -h_.dot(delta);
+    return -h.dot(delta);
   }
-
-  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kLineDof, kLineDof>;
-  using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kLineDof, 1>;
 
   const LeastSquares& problem_;
   const ParameterBlock& block_;

@@ -84,6 +84,14 @@ void SchurSystem::lay_out() {
   group = problem_.prior_blocks;
   join(-1);
   H_ = BorderedBand(std::move(reach), columns - banded);
+  std::size_t couplings = 0;
+  for (std::size_t i = 0; i < problem_.blocks.size(); ++i) {
+    if (!problem_.blocks[i].eliminated) continue;
+    Layout& layout = layout_[i];
+    layout.coupling = couplings;
+    couplings += static_cast<std::size_t>(problem_.blocks[i].dof * (layout.end - layout.first + H_.border()));
+  }
+  couplings_.resize(couplings);
 }
 
 bool SchurSystem::evaluate(const ResidualTerm& term, Rows& rows) const {
@@ -177,10 +185,10 @@ void SchurSystem::begin_landmark(int block) {
   Landmark& landmark = landmarks_.emplace_back();
   landmark.block = block;
   landmark.dof = problem_.blocks[static_cast<std::size_t>(block)].dof;
-  landmark.coupling = couplings_.size();
+  landmark.coupling = couplings_.data() + layout_[static_cast<std::size_t>(block)].coupling;
   landmark.V.setZero();
   landmark.h.setZero();
-  couplings_.resize(couplings_.size() + static_cast<std::size_t>(landmark.dof * width(landmark)), 0.0);
+  std::fill_n(landmark.coupling, landmark.dof * width(landmark), 0.0);
 }
 
 void SchurSystem::add_to_landmark(const Rows& rows) {
@@ -195,7 +203,7 @@ void SchurSystem::add_to_landmark(const Rows& rows) {
     const Rows::Run& run = rows.run[static_cast<std::size_t>(s)];
     const int at =
         run.column < H_.banded() ? run.column - layout.first : layout.end - layout.first + run.column - H_.banded();
-    add_outer_products(rows.of(run), E, 1.0, couplings_.data() + landmark.coupling + at, width(landmark));
+    add_outer_products(rows.of(run), E, 1.0, landmark.coupling + at, width(landmark));
   }
 }
 
@@ -207,7 +215,7 @@ bool SchurSystem::eliminate_landmark(double damping) {
   L.diagonal().head(dof) *= 1.0 + damping + block.share_of_information;
   L(dof - 1, dof - 1) += block.last_information;
   const int n = width(landmark);
-  double* const Z = couplings_.data() + landmark.coupling;
+  double* const Z = landmark.coupling;
   Eigen::Vector4d& y = landmark.h;
   // Cholesky, with both substitutions on the way.
   for (int k = 0; k < dof; ++k) {
@@ -292,7 +300,6 @@ bool SchurSystem::build(double damping) {
   damping_ = damping;
   solved_ = false;
   landmarks_.clear();
-  couplings_.clear();
   for (std::size_t i = 0; i < problem_.blocks.size(); ++i) {
     const ParameterBlock& block = problem_.blocks[i];
     if (has_rotation(block)) {
@@ -350,7 +357,7 @@ void SchurSystem::apply_step() const {
     const int n = width(landmark);
     Eigen::Vector4d delta = -landmark.h;
     for (int k = 0; k < landmark.dof; ++k) {
-      const Eigen::Map<const Eigen::VectorXd> z(couplings_.data() + landmark.coupling + k * n, n);
+      const Eigen::Map<const Eigen::VectorXd> z(landmark.coupling + k * n, n);
       delta[k] -=
           z.head(length).dot(step_.segment(layout.first, length)) + z.tail(H_.border()).dot(step_.tail(H_.border()));
     }

@@ -29,6 +29,8 @@ LeastSquaresResult solve_with_schur(const LeastSquares& problem, const LeastSqua
       from += b.size;
     }
   };
+  save();
+  if (options.settle_landmarks) settle_landmarks(problem, before);
   double damping = 0.0;
   bool built = system.build(damping);
   if (!built) {

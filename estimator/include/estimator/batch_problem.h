@@ -19,10 +19,9 @@
 
 namespace plumbline::estimator {
 
-// How the problem is solved. While there are lines, and in a search always, each step of all parameters is followed by
-// the landmarks' own best values for its poses (variable projection: Ruhe and Wedin 1980, algorithm 3), so that a step
-// is judged by where it leads the poses. Otherwise landmarks that it sends behind a camera or past infinity, lines more
-// than points, shorten every step.
+// How the problem is solved. Each step of all parameters is followed by the landmarks' own best values for its poses
+// (landmark_descent.h). Otherwise landmarks that it sends behind a camera or past infinity, lines more than points,
+// shorten every step.
 enum class SolvePhase {
   kSearch,  // loosely, from a poor start; visual residuals have a Cauchy loss, lest a wrong landmark pull the poses
             // along

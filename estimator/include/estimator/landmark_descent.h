@@ -9,8 +9,9 @@
 
 namespace plumbline::estimator {
 
-// Moves the eliminated blocks. Each starts from its present value or from that in `before`, the values of all blocks
-// before the step, whichever fits better; a landmark that can be seen from neither stays where it is.
+// Moves the eliminated blocks, each to within a tenth of a standard deviation. Where a landmark's factors cannot be
+// evaluated it starts from what it was in `before`, the values of all blocks before the step, and stays where it is if
+// they cannot be evaluated there either.
 void settle_landmarks(const LeastSquares& problem, const std::vector<double>& before);
 
 }  // namespace plumbline::estimator

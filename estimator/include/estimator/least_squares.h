@@ -56,7 +56,8 @@ struct LeastSquaresOptions {
   double step_tolerance = 1e-2;
   // A step that lowers the cost by less than this share of it is the last, too.
   double cost_tolerance = 0.0;
-  // Whether every step is followed by the landmarks' own best values for its poses (variable projection).
+  // Whether every step is followed by the landmarks' own best values for its poses (variable projection), which
+  // `schur` begins with, too.
   bool settle_landmarks = false;
 };
 

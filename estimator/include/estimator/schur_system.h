@@ -42,15 +42,17 @@ class SchurSystem {
   struct Layout {
     int column = -1;                   // of what is left; -1 where eliminated
     Eigen::Matrix<double, 4, 3> plus;  // d Plus(q, d)/dd of the rotation in the block
-    // Of a landmark: the columns before the border that it meets.
+    // Of a landmark: the columns before the border that it meets, and where its rows of couplings_ begin, each of
+    // end - first and then the border's columns.
     int first = 0;
     int end = 0;
+    std::size_t coupling = 0;
   };
   struct Rows;       // a term's residual and derivatives
   struct Landmark {  // with W and h as they are summed up; once eliminated, with Z and y in their place
     int block = -1;
     int dof = 0;
-    std::size_t coupling = 0;  // where its rows begin, each of end - first and then the border's columns
+    double* coupling = nullptr;
     Eigen::Matrix4d V;
     Eigen::Vector4d h;
   };
