@@ -66,6 +66,60 @@ TEST(SlidingWindow, NeesIsInsideItsBand) {
   trials.expect_scaled_outside({"td_error_s", "calibration", "final_pose", "final_velocity", "final_bias", "joint"});
 }
 
+// Which noise there is, and what is known. The estimator believes in both noises throughout.
+TEST(SlidingWindow, EachNoiseAloneIsLessThanBoth) {
+  const auto last_error = [](const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
+    const core::StampedState& last = estimate.states.back();
+    const core::StateTangent d = core::minus(last.state, sim::state_at(truth, last.t_ns));
+    const auto P = estimate.covariance.bottomRightCorner<core::kStateDof, core::kStateDof>();
+    return d.dot(P.ldlt().solve(d));
+  };
+  // Chi-square of 15: 1e-5 above.
+  constexpr double kMost = 50.5;
+  estimator::EstimatorConfig config = testing::believing(testing::kEurocLike, 1.0);
+  config.type = estimator::EstimatorType::kSlidingWindow;
+
+  sim::ScenarioConfig pixels = scenario();
+  pixels.imu.noise = {};
+  const auto in_pixels = sim::simulate(pixels, {1, 10});
+  const core::EstimateLog from_pixels = estimator::estimate(in_pixels.measurements, config);
+  ASSERT_EQ(from_pixels.status, core::SolveStatus::kConverged) << from_pixels.reason;
+  EXPECT_LT(last_error(from_pixels, in_pixels.truth), kMost);
+  EXPECT_LT(std::abs(errors_of(from_pixels, in_pixels.truth).td_s), 4.5 * sigma_of(from_pixels, core::kCovTd));
+
+  // td is told by the pixels: without their noise, and with the prior's means at the truth, it is known far better than
+  // the estimator can believe.
+  sim::ScenarioConfig imu = scenario();
+  imu.camera.pixel_sigma_px = 0.0;
+  imu.prior.means = sim::PriorMeans::kTruth;
+  imu.prior.start = sim::PriorStart::kDrawn;
+  const auto in_imu = sim::simulate(imu, {1, 11});
+  const core::EstimateLog from_imu = estimator::estimate(in_imu.measurements, config);
+  ASSERT_EQ(from_imu.status, core::SolveStatus::kConverged) << from_imu.reason;
+  EXPECT_LT(last_error(from_imu, in_imu.truth), kMost);
+  EXPECT_LT(std::abs(errors_of(from_imu, in_imu.truth).td_s), 0.5 * sigma_of(from_imu, core::kCovTd));
+}
+
+TEST(SlidingWindow, WhatIsKnownStaysAsItIs) {
+  sim::ScenarioConfig c = scenario();
+  c.prior.td_mean_s = c.camera.td_s;
+  c.prior.readout_mean_s = c.camera.readout_s;
+  const auto s = sim::simulate(c, {1, 12});
+  estimator::EstimatorConfig config = online();
+  const core::EstimateLog free = estimator::estimate(s.measurements, config);
+  config.estimate.td = false;
+  config.estimate.readout = false;
+  const core::EstimateLog held = estimator::estimate(s.measurements, config);
+  ASSERT_EQ(free.status, core::SolveStatus::kConverged) << free.reason;
+  ASSERT_EQ(held.status, core::SolveStatus::kConverged) << held.reason;
+  EXPECT_EQ(held.calibration.td_s, s.truth.calibration.td_s);
+  EXPECT_EQ(held.calibration.readout_s, s.truth.calibration.readout_s);
+  EXPECT_EQ(sigma_of(held, core::kCovTd), 0.0);
+  EXPECT_TRUE(held.td_history.empty());
+  // Who knows more is less unsure, but for what the two linearise about.
+  for (int i = core::kCovLastState; i < core::kCovDim; ++i) EXPECT_LE(sigma_of(held, i), 1.02 * sigma_of(free, i)) << i;
+}
+
 // The prior's mean is 0 whatever td is; five sigma, in which a trial may fail, but not with an answer that is wrong.
 TEST(SlidingWindow, FindsTdFromFarOff) {
   for (const double td_s : {-0.05, 0.05, -0.15, 0.15}) {
