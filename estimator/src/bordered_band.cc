@@ -111,12 +111,12 @@ void BorderedBand::solve_upper(Eigen::VectorXd& x) const {
 Eigen::MatrixXd BorderedBand::trailing(int n) const {
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
   const int first = size() - n;
-  for (int j = first; j < size(); ++j) {
-    const int last = j < banded_ ? reach_[static_cast<std::size_t>(j)] : banded_;
-    for (int i = j; i < size(); ++i) {
-      if (i < last || i >= banded_) A(i - first, j - first) = *at(i, j);
-    }
+  for (int j = std::max(first, 0); j < banded_; ++j) {
+    std::copy_n(at(j, j), reach_[static_cast<std::size_t>(j)] - j, &A(j - first, j - first));
   }
+  const int rows = std::min(n, border());
+  A.bottomRows(rows) = border_.bottomRightCorner(rows, n);
+  A.triangularView<Eigen::StrictlyUpper>().setZero();
   return A;
 }
 

@@ -265,16 +265,16 @@ void SchurSystem::add_prior() {
   Eigen::MatrixXd information = prior.information;
   for (std::size_t i = 0; i < prior.parts.size(); ++i) {
     const MarginalPrior::Part& part = prior.parts[i];
-    const auto transform = [&]<int kDof>(const Eigen::Matrix<double, kDof, kDof>& J, int column) {
-      information.middleCols<kDof>(column) = (information.middleCols<kDof>(column) * J).eval();
-      information.middleRows<kDof>(column) = (J.transpose() * information.middleRows<kDof>(column)).eval();
-      gradient.segment<kDof>(column) = (J.transpose() * gradient.segment<kDof>(column)).eval();
-    };
     if (part.kind == MarginalPrior::Kind::kState) {
-      const core::State x = unpack_state(parameters[i]);
-      transform(invariant_difference_jacobian(x, xi.segment<core::kStateDof>(part.column)), part.column);
+      const core::StateTangent of_state = xi.segment<core::kStateDof>(part.column);
+      change_chart(part.column, invariant_difference_jacobian(unpack_state(parameters[i]), of_state), information,
+                   gradient);
     } else if (part.kind == MarginalPrior::Kind::kPose) {
-      transform(core::right_jacobian_inverse(xi.segment<3>(part.column + 3)), part.column + 3);
+      const int rotation = part.column + 3;
+      const Eigen::Matrix3d J = core::right_jacobian_inverse(xi.segment<3>(rotation));
+      information.middleCols<3>(rotation) = (information.middleCols<3>(rotation) * J).eval();
+      information.middleRows<3>(rotation) = (J.transpose() * information.middleRows<3>(rotation)).eval();
+      gradient.segment<3>(rotation) = (J.transpose() * gradient.segment<3>(rotation)).eval();
     }
   }
   for (std::size_t i = 0; i < prior.parts.size(); ++i) {

@@ -18,12 +18,11 @@ namespace {
 // leave again: so little that nothing depends on it, standard deviations of 100 in its bearing and of 10 1/m.
 const Eigen::Vector3d kPointFloor(1e-4, 1e-4, 1e-2);
 
-// H <- M^T H M, g <- M^T g for the columns of one block.
-void change_columns(int column, const Eigen::MatrixXd& M, Eigen::MatrixXd& H, Eigen::VectorXd& g) {
-  const Eigen::Index n = M.rows();
-  H.middleCols(column, n) = (H.middleCols(column, n) * M).eval();
-  H.middleRows(column, n) = (M.transpose() * H.middleRows(column, n)).eval();
-  g.segment(column, n) = (M.transpose() * g.segment(column, n)).eval();
+// H <- M^T H M, g <- M^T g for the columns of one point.
+void change_columns(int column, const Eigen::Matrix3d& M, Eigen::MatrixXd& H, Eigen::VectorXd& g) {
+  H.middleCols<3>(column) = (H.middleCols<3>(column) * M).eval();
+  H.middleRows<3>(column) = (M.transpose() * H.middleRows<3>(column)).eval();
+  g.segment<3>(column) = (M.transpose() * g.segment<3>(column)).eval();
 }
 
 // The block at `from` depends on that at `on` too: d_from = ... + J d_on.
@@ -160,7 +159,7 @@ void Window::fold_oldest() {
   Eigen::VectorXd g = system.g();
   const auto column_of = [&](const double* values) { return system.column(built.of(values)); };
   for (const auto& frame : frames_) {
-    change_columns(column_of(frame->x.data()), from_invariant(unpack_state(frame->x.data())), H, g);
+    change_chart(column_of(frame->x.data()), from_invariant(unpack_state(frame->x.data())), H, g);
   }
   // Blocks that neither a term nor the prior speaks of stay out of the new prior.
   std::vector<bool> involved(end, false);
@@ -229,12 +228,15 @@ void Window::fold_oldest() {
     parts.push_back(std::move(part));
     prior_values_.push_back(block.values);
   }
-  Eigen::MatrixXd information = H(columns, columns);
+  if (static_cast<Eigen::Index>(columns.size()) < H.cols()) {
+    H = H(columns, columns).eval();
+    g = g(columns).eval();
+  }
   // What rounding leaves of the directions that nothing is known of, in the gradient too, stays without weight.
   constexpr double kRounding = 1e-12;
-  information.diagonal() *= 1.0 + kRounding;
-  prior_ = std::make_unique<MarginalPrior>(
-      MarginalPrior{std::move(parts), information.selfadjointView<Eigen::Lower>(), g(columns)});
+  H.diagonal() *= 1.0 + kRounding;
+  prior_ =
+      std::make_unique<MarginalPrior>(MarginalPrior{std::move(parts), H.selfadjointView<Eigen::Lower>(), std::move(g)});
   initial_.clear();
 
   for (const std::int64_t id : leaving_ids) points_.erase(id);

@@ -44,4 +44,15 @@ inline StateMatrix from_invariant(const core::State& x) {
   return M;
 }
 
+// H <- J^T H J and g <- J^T g in the columns of one state, J one of the two above: only its columns of orientation are
+// not those of the identity.
+inline void change_chart(int column, const StateMatrix& J, Eigen::MatrixXd& H, Eigen::VectorXd& g) {
+  static_assert(core::kOrientation == 3 && core::kGyroBias == 9);
+  const Eigen::Matrix<double, 9, 3> K = J.block<9, 3>(0, core::kOrientation);
+  const int orientation = column + core::kOrientation;
+  H.middleCols<3>(orientation) = (H.middleCols<9>(column) * K).eval();
+  H.middleRows<3>(orientation) = (K.transpose() * H.middleRows<9>(column)).eval();
+  g.segment<3>(orientation) = (K.transpose() * g.segment<9>(column)).eval();
+}
+
 }  // namespace plumbline::estimator
