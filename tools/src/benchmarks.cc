@@ -1,6 +1,9 @@
 // Google Benchmark of the parts that a trial spends its time in: build/<preset>/tools/plumbline_benchmarks
+#include <array>
+#include <ctime>
 #include <filesystem>
 #include <functional>
+#include <numeric>
 
 #include <benchmark/benchmark.h>
 
@@ -8,6 +11,7 @@
 #include "estimator/estimate.h"
 #include "estimator/factors/preintegration.h"
 #include "estimator/keyframes.h"
+#include "estimator/window.h"
 #include "eval/cramer_rao.h"
 #include "sim/simulate.h"
 #include "sim/truth_files.h"
@@ -116,13 +120,59 @@ void simulate_and_write_lines(benchmark::State& state) {
 }
 BENCHMARK(simulate_and_write_lines)->Unit(benchmark::kMillisecond);
 
+estimator::Solver solver_of(const benchmark::State& state) {
+  return state.range(0) != 0 ? estimator::Solver::kCeres : estimator::Solver::kSchur;
+}
+
+// 15 s at 10 Hz.
 void batch_solve(benchmark::State& state) {
   const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
+  estimator::EstimatorConfig config;
+  config.solver = solver_of(state);
   int observations = 0;
-  for ([[maybe_unused]] auto _ : state) observations = estimator::estimate(s.measurements, {}).summary.observations;
+  for ([[maybe_unused]] auto _ : state) observations = estimator::estimate(s.measurements, config).summary.observations;
   state.counters["observations"] = observations;
 }
-BENCHMARK(batch_solve)->Unit(benchmark::kSecond)->Iterations(3);
+BENCHMARK(batch_solve)->ArgName("ceres")->Arg(0)->Arg(1)->Unit(benchmark::kSecond)->Iterations(3);
+
+// A window of 10 keyframes and 40 kept points that moves over the same 15 s: what a keyframe takes, and in which parts.
+void window(benchmark::State& state) {
+  const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
+  estimator::EstimatorConfig config;
+  config.type = estimator::EstimatorType::kSlidingWindow;
+  config.solver = solver_of(state);
+  enum Part { kAdd, kTriangulate, kSolve, kAssess, kFold, kParts };
+  std::array<double, kParts> spent_s = {};
+  int keyframes = 0;
+  int systems = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    estimator::Window window(s.measurements, config);
+    const auto timed = [&](Part part, const auto& work) {
+      const std::clock_t begin = std::clock();
+      work();
+      spent_s[part] += static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    };
+    for (const std::size_t frame : estimator::select_keyframes(s.measurements.frames, 10.0)) {
+      timed(kAdd, [&] { window.add_frame(frame); });
+      timed(kTriangulate, [&] { window.triangulate(); });
+      timed(kSolve, [&] { systems += window.solve().result.iterations; });
+      timed(kAssess, [&] { window.assess(true); });
+      timed(kFold, [&] {
+        while (window.size() > static_cast<std::size_t>(config.window.keyframes)) window.fold_oldest();
+      });
+      ++keyframes;
+    }
+  }
+  const auto each_ms = [&](double total_s) { return 1e3 * total_s / keyframes; };
+  state.counters["keyframe_ms"] = each_ms(std::accumulate(spent_s.begin(), spent_s.end(), 0.0));
+  state.counters["add_ms"] = each_ms(spent_s[kAdd]);  // with tracks, preintegration, tables of the motion at a frame
+  state.counters["triangulate_ms"] = each_ms(spent_s[kTriangulate]);
+  state.counters["solve_ms"] = each_ms(spent_s[kSolve]);
+  state.counters["assess_ms"] = each_ms(spent_s[kAssess]);
+  state.counters["marginalise_ms"] = each_ms(spent_s[kFold]);
+  state.counters["systems"] = static_cast<double>(systems) / keyframes;
+}
+BENCHMARK(window)->ArgName("ceres")->Arg(0)->Arg(1)->Unit(benchmark::kSecond)->Iterations(3);
 
 // The Cramer-Rao bound of the same problem, without and with that of every instant.
 void bound(benchmark::State& state) {
