@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
 constexpr int kTrials = 150;
+constexpr int kHalf = kTrials / 2;
 constexpr double kWholeSuite = 35.0;  // tests that the suite of configs/nightly.yaml makes, and Holm corrects for
 
 struct TrialErrors {
@@ -111,8 +112,8 @@ class NightlyStudy : public ::testing::Test {
       const auto u = stream.uniforms(static_cast<std::uint64_t>(t));
       // Three different trials.
       const auto base = static_cast<std::size_t>(u[0] * kTrials);
-      const auto first = (base + 1 + static_cast<std::size_t>(u[1] * (kTrials / 2 - 2))) % kTrials;
-      const auto second = (base + kTrials / 2 + static_cast<std::size_t>(u[2] * (kTrials / 2 - 1))) % kTrials;
+      const auto first = (base + 1 + static_cast<std::size_t>(u[1] * (kHalf - 2))) % kTrials;
+      const auto second = (base + kHalf + static_cast<std::size_t>(u[2] * (kHalf - 1))) % kTrials;
       judged.baseline->add(row_of(t, base, first, s_a));
       judged.tonight.add(row_of(t, base, second, s_b));
     }

@@ -9,6 +9,7 @@
 
 #include "cell_series.h"
 #include "eval/metrics.h"
+#include "eval/statistics.h"
 #include "markup.h"
 
 namespace plumbline::tools {
@@ -105,11 +106,14 @@ ordered_json pairs_json(const NightCell& tonight, const NightCell& baseline, con
 ordered_json cells_json(const NightReport& report) {
   ordered_json json = ordered_json::array();
   for (const NightCell& cell : report.night.cells) {
-    ordered_json entry = {
-        {"experiment", cell.experiment},  {"axes", cell.axes},
-        {"n", cell.fixed.size()},         {"n_ok", std::ranges::count(cell.fixed, true, &eval::Row::ok)},
-        {"n_fresh", cell.fresh.size()},   {"report", cell.experiment + "/report.html"},
-        {"pairs", ordered_json::object()}};
+    ordered_json entry = {{"experiment", cell.experiment},
+                          {"axes", cell.axes},
+                          {"n", cell.fixed.size()},
+                          {"n_ok", std::ranges::count(cell.fixed, true, &eval::Row::ok)},
+                          {"n_fresh", cell.fresh.size()},
+                          {"median_s", cell.estimate_s.empty() ? 0.0 : rounded(eval::median(cell.estimate_s))},
+                          {"report", cell.experiment + "/report.html"},
+                          {"pairs", ordered_json::object()}};
     if (const NightCell* before = find_partner(report.baseline, cell, report.across_scenarios)) {
       for (const std::string& metric : report.metrics) entry["pairs"][metric] = pairs_json(cell, *before, metric);
     }

@@ -27,11 +27,12 @@ function merged(option, theme) {
     axisLine: { lineStyle: { color: theme.line } },
     splitLine: { lineStyle: { color: theme.line, opacity: 0.6 }, show: a.type !== "category" }, ...a, axisLabel: { color: theme.muted, hideOverlap: true, ...a.axisLabel },
   });
+  const names = new Set(option.series.map((series) => series.name));
   return {
     animation: false, color: theme.colours, textStyle: { fontFamily: "system-ui, DejaVu Sans, sans-serif" },
     aria: { enabled: true }, grid: { left: 64, right: 16, top: 44, bottom: 46 }, ...option,
     legend: option.legend === null ? undefined
-      : { type: "scroll", top: 0, pageIconColor: theme.muted, pageTextStyle: { color: theme.muted }, itemWidth: 18, itemHeight: 8, textStyle: { color: theme.text, fontSize: 11 }, ...option.legend },
+      : { type: names.size > 6 ? "scroll" : "plain", top: 0, pageIconColor: theme.muted, pageTextStyle: { color: theme.muted }, itemWidth: 18, itemHeight: 8, textStyle: { color: theme.text, fontSize: 11 }, ...option.legend },
     tooltip: { confine: true, backgroundColor: theme.raised, borderColor: theme.line, textStyle: { color: theme.text, fontSize: 12 },
       valueFormatter: (v) => (typeof v === "number" ? short(v) : v), ...option.tooltip },
     xAxis: axis(option.xAxis), yAxis: axis({ gap: 48, ...option.yAxis }),

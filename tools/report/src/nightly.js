@@ -21,21 +21,25 @@ function gatesSection(data) {
   const scale = (g) => data.metrics.find((m) => m.name === g.name)?.scale ?? 1;
   const unit = (g) => splitLabel(data.metrics.find((m) => m.name === g.name)?.label ?? "").unit;
   const rmse = (title, key) => ({ title, number: true, value: (g) => (g[key] === undefined ? undefined : g[key] * scale(g)), show: (g) => (g[key] === undefined ? "" : `${figure(g[key] * scale(g))} ${unit(g)}`) });
-  const list = table("gates", [
+  const common = [
     { title: "verdict", value: (g) => g.verdict, className: (g) => verdictClass[g.verdict] },
     { title: "experiment", value: place },
     { title: "gate", value: (g) => (g.kind === "consistency" ? `NEES of ${labelOf(data, g.name)}` : labelOf(data, g.name)) },
+  ];
+  const lookAt = { title: "look at", value: (g) => g.replay, hint: "the trial that got worse most; the button copies the command that makes it again",
+    show: (g) => (g.replay ? h("span", { title: g.replay }, `trial ${g.replay.split(" ").at(-1)} `, copyButton(g.replay)) : "") };
+  const comparisons = table("gates", [
+    ...common,
     rmse("baseline", "rmse_a"), rmse("tonight", "rmse_b"),
     { title: "ratio", number: true, hint: "tonight over baseline, seed by seed; above 1 is worse", value: (g) => g.ratio, show: (g) => (g.ratio === undefined ? "" : g.ratio.toFixed(4)) },
     { title: "95 % interval", value: (g) => (g.ci95 ? `${g.ci95[0].toFixed(4)} to ${g.ci95[1].toFixed(4)}` : "") },
     { title: "p", number: true, hint: "after Holm's correction for all comparisons of the night", value: (g) => g.p, show: (g) => (g.p === undefined ? "" : short(g.p)) },
     { title: "found from", number: true, hint: "the smallest ratio that four of five such nights would find", value: (g) => g.detectable, show: (g) => (g.detectable ? g.detectable.toFixed(3) : "") },
-    { title: "look at", value: (g) => g.replay, hint: "the trial that got worse most; the button copies the command that makes it again",
-      show: (g) => (g.replay ? h("span", { title: g.replay }, `trial ${g.replay.split(" ").at(-1)} `, copyButton(g.replay)) : "") },
-    { title: "note", wrap: true, value: (g) => g.message, show: (g) => (g.ratio === undefined ? g.message : "") },
-  ], rows);
+    lookAt,
+  ], rows.filter((g) => g.ratio !== undefined));
+  const others = table("other_gates", [...common, { title: "figures", wrap: true, value: (g) => g.message }, lookAt], rows.filter((g) => g.ratio === undefined));
   return section("gates", "Gates", "Each seed is compared with itself in the baseline, so that the noise is the same on both sides. Red needs both: certain after correction for all comparisons, and larger than the practical minimum.",
-    list.element);
+    rows.some((g) => g.ratio !== undefined) ? comparisons.element : null, h("h3", { class: "part" }, "Failures, identity and consistency"), others.element);
 }
 
 // All ratios with their intervals, worst first.
@@ -80,7 +84,7 @@ function trendChart(data, metric) {
     rows: () => [["night", "started", "commit", "experiment", "axes", `rmse_${unit}`, "n", "red"], ...data.trends.filter((t) => t.metric === metric).map((t) => [t.night, t.started, t.commit, t.experiment, JSON.stringify(t.axes), t.rmse * info.scale, t.n, t.red])],
     caption: "The seeds are the same each night, so an unchanged program draws a level line. Large marks: nights that were red.",
     option: (theme) => ({
-      xAxis: { type: "category", data: nights.map(label), name: "night" }, yAxis: { type: "value", name: "RMSE / baseline [%]", scale: true }, tooltip: { trigger: "item" },
+      xAxis: { type: "category", data: nights.map(label), name: "night" }, yAxis: { type: "value", name: "RMSE / baseline [%]", min: (v) => Math.floor(Math.min(v.min, 98)), max: (v) => Math.ceil(Math.max(v.max, 102)) }, tooltip: { trigger: "item" },
       series: series.map(({ cell, points, reference }, i) => {
         return { name: place(cell), type: "line", color: theme.colours[i % 8], symbolSize: (_, p) => (points[p.dataIndex]?.red ? 12 : 6),
           data: points.map((p) => (p ? { value: (100 * p.rmse) / reference.rmse, itemStyle: { color: p.red ? theme.failed : theme.colours[i % 8] } } : "-")),
@@ -139,7 +143,7 @@ function runtimeSection(data) {
     { title: "ok", number: true, value: (c) => c.n_ok, show: (c) => `${c.n_ok}/${c.n}`, className: (c) => (c.n_ok < c.n ? "bad" : "") },
     { title: "fresh seeds", number: true, value: (c) => c.n_fresh },
     ...["median_s", "baseline_s"].map((key) => ({ title: key === "median_s" ? "a trial [s]" : "baseline [s]", number: true,
-      value: (c) => data.runtime.find((r) => same(r, c))?.[key], show: (c) => figure(data.runtime.find((r) => same(r, c))?.[key]) })),
+      value: (c) => (key === "median_s" ? c : data.runtime.find((r) => same(r, c)))?.[key], show: (c) => figure((key === "median_s" ? c : data.runtime.find((r) => same(r, c)))?.[key]) })),
     { title: "time ratio", number: true, hint: "processor time of the estimator, tonight over baseline; never a reason for red", value: (c) => data.runtime.find((r) => same(r, c))?.ratio,
       show: (c) => data.runtime.find((r) => same(r, c))?.ratio.toFixed(2) ?? "", className: (c) => (data.runtime.find((r) => same(r, c))?.slower ? "warn" : "") },
   ], data.cells);
