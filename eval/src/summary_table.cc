@@ -80,7 +80,37 @@ void append_metric(std::string& out, const MetricSummary& m, bool bound_column) 
                  last_columns(m.bound && m.bound->efficiency ? fmt::format("{:.2f}", *m.bound->efficiency) : ""));
 }
 
+void append_markdown(std::string& out, const MetricSummary& m) {
+  const MetricInfo info = metric_info(m.name);
+  if (!info.in_table && !m.nees) return;
+  const auto shown = [&](double value) { return figure(value * info.table_unit, m.rmse * info.table_unit); };
+  const auto of_table = [&](const std::string& text) { return info.in_table ? text : std::string(); };
+  fmt::format_to(std::back_inserter(out), "| {} | {} | {} | {} | {} | {} | {} |\n", info.label, of_table(shown(m.mean)),
+                 of_table(shown(m.rmse)),
+                 m.rmse_ci95 ? of_table(fmt::format("{} to {}", shown(m.rmse_ci95->lo), shown(m.rmse_ci95->hi))) : "",
+                 m.bound ? of_table(shown(m.bound->crlb)) : "",
+                 m.bound && m.bound->efficiency ? of_table(fmt::format("{:.2f}", *m.bound->efficiency)) : "",
+                 m.nees ? nees_text(*m.nees) : "");
+}
+
 }  // namespace
+
+std::string summary_markdown(const std::vector<CellSummary>& cells) {
+  std::string out;
+  for (const CellSummary& cell : cells) {
+    fmt::format_to(std::back_inserter(out), "{}**{}**, {}/{} ok\n\n", out.empty() ? "" : "\n", title(cell), cell.n_ok,
+                   cell.n);
+    if (cell.metrics.empty()) {
+      out += "No trial succeeded.\n";
+      continue;
+    }
+    out += "| metric | mean | RMSE | 95 % interval | bound | RMSE / bound | mean NEES (95 % band) |\n";
+    out += "|---|---:|---:|---|---:|---:|---:|\n";
+    for (const MetricSummary& metric : cell.metrics) append_markdown(out, metric);
+    if (!cell.note.empty()) fmt::format_to(std::back_inserter(out), "\n{}\n", cell.note);
+  }
+  return out;
+}
 
 std::string summary_table(const std::vector<CellSummary>& cells) {
   std::string out;

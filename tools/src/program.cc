@@ -74,7 +74,8 @@ int parse_and_run(int argc, const char* const* argv) {
   };
   add_slurm(run_command, run_options);
   run_command->add_flag("--fresh", run_options.fresh, "discard what the folder holds");
-  run_command->add_flag("--json", run_options.json, "print the summary as JSON");
+  bool run_json = false;
+  run_command->add_flag("--json", run_json, "print the summary as JSON");
   add_set(run_command, run_options.set);
   add_only(run_command, run_options.only);
 
@@ -141,6 +142,24 @@ int parse_and_run(int argc, const char* const* argv) {
       ->capture_default_str();
   compare_command->add_flag("--json", compare_options.json, "print JSON");
 
+  NightlyOptions nightly_options;
+  CLI::App* nightly_command = app.add_subcommand("nightly", "run a suite and compare it with an earlier night");
+  nightly_command->add_option("SUITE", nightly_options.suite, "suite file (YAML)")->required();
+  nightly_command->add_option("--history", nightly_options.history, "SQLite file of all nights; made where missing")
+      ->required();
+  nightly_command->add_option("--baseline", nightly_options.baseline, "last_green, a tag, or a commit")
+      ->capture_default_str();
+  nightly_command->add_option("--tag", nightly_options.tag, "a name for this night, for later baselines");
+  nightly_command->add_option("--out", nightly_options.out, "folder of this night; default out/nightly/DATE_TIME");
+  nightly_command->add_option("--fresh-seed", nightly_options.fresh_seed,
+                              "seed of the trials that are new each night; default the time");
+  nightly_command->add_flag("--quick", nightly_options.quick, "few trials; compared with quick nights alone");
+  nightly_command->add_flag("--across-scenarios", nightly_options.across_scenarios,
+                            "compare also experiments whose scenario has changed");
+  add_set(nightly_command, nightly_options.set);
+  nightly_command->add_option("--jobs", nightly_options.jobs, "workers; default one a processor")
+      ->check(CLI::PositiveNumber);
+
   ExportResultsOptions export_options;
   CLI::App* export_command = app.add_subcommand("export-results", "write the results of a run as one file");
   export_command->add_option("OUT_DIR", export_options.results, "folder of the results")->required();
@@ -159,6 +178,13 @@ int parse_and_run(int argc, const char* const* argv) {
   merge_command->add_option("OUT", merge_options.out, "folder of the sweep")->required();
   merge_command->add_flag("--wait", merge_options.wait, "until no other program writes to the folder");
   merge_command->add_flag("--json", merge_options.json, "print the summary as JSON");
+
+  ReportOptions report_options;
+  CLI::App* report_command = app.add_subcommand("report", "the results of a sweep as one page, or as Markdown");
+  report_command->add_option("OUT", report_options.results, "folder of the sweep")->required();
+  report_command->add_option("--format", report_options.format, "html (default) or md")
+      ->transform(CLI::CheckedTransformer(words<ReportFormat>(kReportFormatNames)));
+  report_command->add_option("--out", report_options.out, "the file; default OUT/report.html, and stdout for Markdown");
 
   RunOptions resubmit_options;
   resubmit_options.launcher = Launcher::kSlurm;
@@ -221,15 +247,18 @@ int parse_and_run(int argc, const char* const* argv) {
     return app.exit(error) == 0 ? kExitOk : kExitBadInput;
   }
   run_options.shard = parse_shard(shard);
+  if (run_json) run_options.output = SummaryOutput::kJson;
   if (*run_command) return run(run_options);
   if (*plan_command) return plan(plan_options);
   if (*resubmit_command) return run(resubmit_options);
   if (*status_command) return status(status_options);
   if (*merge_command) return merge(merge_options);
+  if (*report_command) return report(report_options);
   if (*simulate_command) return simulate(simulate_options);
   if (*estimate_command) return estimate(estimate_options);
   if (*evaluate_command) return evaluate(evaluate_options);
   if (*compare_command) return compare(compare_options);
+  if (*nightly_command) return nightly(nightly_options);
   if (*export_command) return export_results(export_options);
   if (*replay_command) return replay(replay_options);
   if (*ba_command) return ba(ba_options);

@@ -71,7 +71,8 @@ void refuse_to_lose(const fs::path& out, const Plan& plan, bool fresh) {
 }
 
 void discard(const fs::path& out) {
-  for (const char* name : {"results.jsonl", "timings.jsonl", "incidents.jsonl", "summary.json", "manifest.json"}) {
+  for (const char* name :
+       {"results.jsonl", "timings.jsonl", "incidents.jsonl", "summary.json", "manifest.json", "report.html"}) {
     fs::remove(out / name);
   }
   fs::remove_all(out / "series");
@@ -218,7 +219,7 @@ int run(const RunOptions& options, const TrialFunction& trial) {
   const std::vector<int> indices = state.incomplete();
   if (indices.empty() && !state.has_journals() && fs::exists(out / "summary.json")) {
     fmt::print(stderr, "plumbline: nothing to do, all {} runs are in {}\n", plan.runs(), out.generic_string());
-    return conclude(plan, out, options.json);
+    return conclude(plan, out, options.output);
   }
   if (options.launcher == Launcher::kSlurm) return run_on_cluster(plan, out, options, std::move(state), trial);
   {
@@ -226,7 +227,7 @@ int run(const RunOptions& options, const TrialFunction& trial) {
     if (!run_trials(plan, out, state, indices, options, journal, trial)) return kExitInternal;
   }
   publish(read_state(plan, out), out);
-  return conclude(plan, out, options.json);
+  return conclude(plan, out, options.output);
 }
 
 }  // namespace plumbline::tools

@@ -117,7 +117,7 @@ int merge(const MergeOptions& options) {
     return kExitInternal;
   }
   publish(state, options.out);
-  return conclude(plan, options.out, options.json);
+  return conclude(plan, options.out, options.json ? SummaryOutput::kJson : SummaryOutput::kTable);
 }
 
 }  // namespace plumbline::tools

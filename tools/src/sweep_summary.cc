@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "eval/summary.h"
 #include "eval/summary_table.h"
+#include "tools/report.h"
 #include "tools/sweep.h"
 #include "tools/version.h"
 
@@ -17,24 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-
-// Cell by cell, so that no more than the rows of one are held.
-std::vector<eval::CellSummary> summarise_cells(const Plan& plan, const fs::path& out) {
-  std::vector<eval::CellSummary> summaries;
-  std::vector<eval::Row> rows;
-  const auto close_cell = [&] {
-    const Cell& cell = plan.cells[summaries.size()];
-    const bool robust = cell.experiment.estimator.loss != estimator::RobustLoss::kNone;
-    summaries.push_back(eval::summarise(rows, cell.axes, robust ? "the estimator has a robust loss" : ""));
-    rows.clear();
-  };
-  eval::for_each_row(out / "results.jsonl", [&](const eval::Row& row) {
-    while (static_cast<int>(summaries.size()) < row.cell) close_cell();
-    rows.push_back(row);
-  });
-  while (summaries.size() < plan.cells.size()) close_cell();
-  return summaries;
-}
 
 // Mean processor seconds a trial.
 ordered_json mean_runtime(const fs::path& out) {
@@ -54,7 +37,24 @@ ordered_json mean_runtime(const fs::path& out) {
 
 }  // namespace
 
-int conclude(const Plan& plan, const fs::path& out, bool json) {
+std::vector<eval::CellSummary> summarise_cells(const Plan& plan, const fs::path& out) {
+  std::vector<eval::CellSummary> summaries;
+  std::vector<eval::Row> rows;
+  const auto close_cell = [&] {
+    const Cell& cell = plan.cells[summaries.size()];
+    const bool robust = cell.experiment.estimator.loss != estimator::RobustLoss::kNone;
+    summaries.push_back(eval::summarise(rows, cell.axes, robust ? "the estimator has a robust loss" : ""));
+    rows.clear();
+  };
+  eval::for_each_row(out / "results.jsonl", [&](const eval::Row& row) {
+    while (static_cast<int>(summaries.size()) < row.cell) close_cell();
+    rows.push_back(row);
+  });
+  while (summaries.size() < plan.cells.size()) close_cell();
+  return summaries;
+}
+
+int conclude(const Plan& plan, const fs::path& out, SummaryOutput output) {
   const std::vector<eval::CellSummary> cells = summarise_cells(plan, out);
   ordered_json json_cells = ordered_json::array();
   int rows = 0;
@@ -71,10 +71,12 @@ int conclude(const Plan& plan, const fs::path& out, bool json) {
   std::ostringstream old;
   old << std::ifstream(out / "summary.json", std::ios::binary).rdbuf();
   if (old.str() != text) core::write_file_atomically(out / "summary.json", text);
-  if (json) {
+  write_report(plan, out, cells, out / kReportFile);
+  if (output == SummaryOutput::kJson) {
     fmt::print("{}", text);
-  } else {
-    fmt::print("{}\nresults: {}\n", eval::summary_table(cells), out.generic_string());
+  } else if (output == SummaryOutput::kTable) {
+    fmt::print("{}\nresults: {}\nreport: {}\n", eval::summary_table(cells), out.generic_string(),
+               (out / kReportFile).generic_string());
   }
   if (rows < plan.runs()) {
     fmt::print(stderr, "plumbline: {} runs were lost to the machine, see {}; to try them again: plumbline run {}\n",

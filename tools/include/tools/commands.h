@@ -30,6 +30,9 @@ struct Shard {
   int of = 1;
 };
 
+// Of a sweep that has ended, on stdout.
+enum class SummaryOutput { kTable, kJson, kNone };
+
 struct RunOptions {
   std::filesystem::path experiment;          // the file, or the folder of a planned sweep
   std::optional<std::filesystem::path> out;  // out/<experiment.name>
@@ -38,7 +41,7 @@ struct RunOptions {
   std::vector<std::string> set;
   std::vector<std::string> only;  // KEY=VALUE of an axis: these cells alone
   bool fresh = false;             // discard what the folder holds
-  bool json = false;
+  SummaryOutput output = SummaryOutput::kTable;
   Launcher launcher = Launcher::kProcesses;
   std::optional<Shard> shard;  // this one alone, to be merged
   std::string partition;       // of Slurm; its default where empty
@@ -69,6 +72,16 @@ struct MergeOptions {
   bool wait = false;  // until no one else writes to the folder
 };
 int merge(const MergeOptions& options);  // kExitInternal where runs are missing
+
+enum class ReportFormat { kHtml, kMd };
+inline constexpr std::array<std::string_view, 2> kReportFormatNames = {"html", "md"};
+
+struct ReportOptions {
+  std::filesystem::path results;  // the folder of a sweep
+  ReportFormat format = ReportFormat::kHtml;
+  std::optional<std::filesystem::path> out;  // RESULTS/report.html; Markdown goes to stdout
+};
+int report(const ReportOptions& options);
 
 struct SimulateOptions {
   std::filesystem::path scenario;
@@ -107,6 +120,20 @@ struct CompareOptions {
   bool json = false;
 };
 int compare(const CompareOptions& options);  // kExitWorse where B is significantly worse
+
+struct NightlyOptions {
+  std::filesystem::path suite;
+  std::filesystem::path history;
+  std::string baseline = "last_green";       // or a tag, or the beginning of a commit
+  std::string tag;                           // for this night
+  std::optional<std::filesystem::path> out;  // out/nightly/DATE_TIME
+  std::optional<std::uint64_t> fresh_seed;   // the time
+  std::vector<std::string> set;              // on top of every experiment: what would the gates say to this?
+  bool across_scenarios = false;             // compares also what was measured in another scenario
+  bool quick = false;
+  int jobs = 0;
+};
+int nightly(const NightlyOptions& options);  // kExitWorse where a gate is red, kExitInternal where runs were lost
 
 enum class ResultsFormat { kCsv, kSqlite };
 inline constexpr std::array<std::string_view, 2> kResultsFormatNames = {"csv", "sqlite"};

@@ -8,6 +8,7 @@
 
 #include "eval/evaluate.h"
 #include "eval/runner.h"
+#include "eval/summary.h"
 #include "tools/commands.h"
 #include "tools/experiment.h"
 #include "tools/run_trial.h"
@@ -34,8 +35,12 @@ Finished run_one(const Plan& plan, int index, const TrialFunction& trial);
 // The row of a trial that ended by its own fault.
 eval::Row failed_row(const Plan& plan, int index, const eval::TrialEnd& end);
 
-// Of a published sweep: writes summary.json where it is not as it should be, prints it, and returns the exit code.
-int conclude(const Plan& plan, const std::filesystem::path& out, bool json);
+// Of a published sweep, cell by cell, so that no more than the rows of one are held.
+std::vector<eval::CellSummary> summarise_cells(const Plan& plan, const std::filesystem::path& out);
+
+// Of a published sweep: writes summary.json where it is not as it should be and report.html, prints the summary, and
+// returns the exit code.
+int conclude(const Plan& plan, const std::filesystem::path& out, SummaryOutput output);
 
 // To Slurm, in shards: what is missing, each run about trial_s of work.
 int submit(const Plan& plan, const std::filesystem::path& out, const RunOptions& options, const SweepState& state,
