@@ -13,6 +13,7 @@
 namespace plumbline::testing {
 
 using estimator::AnchoredPoint;
+using estimator::FreeCameraSight;
 using estimator::OwnAnchoredPoint;
 using estimator::PropagatedSight;
 using estimator::VelocitySight;
@@ -20,7 +21,8 @@ using estimator::VelocitySight;
 struct AnchoredVariant {
   Variant look;
   bool propagated = true;
-  bool own = false;  // the observer is the anchor
+  bool own = false;          // the observer is the anchor
+  bool free_camera = false;  // its intrinsics are estimated
 };
 
 inline FactorScene anchored_scene(const TwoViews& s, const AnchoredVariant& variant, std::vector<Block> blocks,
@@ -38,8 +40,17 @@ inline FactorScene anchored_scene(const TwoViews& s, const AnchoredVariant& vari
                                      .observer = frame,
                                      .observed_pixel = pixel,
                                      .T_B_A = T_B_A};
+    // The unit sphere has no pixels.
+    const CameraModel in_pixels{s.camera, kSigmaPx, kGravity};
     const PropagatedSight sight(model, timing, pixel);
-    if (variant.own) {
+    const FreeCameraSight free(in_pixels, timing, pixel);
+    if (variant.free_camera && variant.own) {
+      scene.factor = std::make_unique<OwnAnchoredPoint<FreeCameraSight>>(free, T_B_A);
+      scene.reference = automatic<PlainOwn<PlainFreeCameraPoint>, 2, 16, 7, 1, 1, 3, 4>({{plain}});
+    } else if (variant.free_camera) {
+      scene.factor = std::make_unique<AnchoredPoint<FreeCameraSight>>(free, T_B_A);
+      scene.reference = automatic<PlainFreeCameraPoint, 2, 16, 16, 7, 1, 1, 3, 4>({plain});
+    } else if (variant.own) {
       scene.factor = std::make_unique<OwnAnchoredPoint<PropagatedSight>>(sight, T_B_A);
       scene.reference = automatic<PlainOwn<PlainPropagatedPoint>, 2, 16, 7, 1, 1, 3>({plain});
     } else {
@@ -73,6 +84,10 @@ inline FactorSubject anchored_subject(const AnchoredVariant& variant, const std:
     if (request.off_truth) displace_all(blocks, request.scene);
     for (const std::size_t k : {0U, 1U}) move_state(request.T_new_W, blocks[k]);
     if (variant.own) blocks.erase(blocks.begin() + 1);
+    if (variant.free_camera) {
+      blocks.push_back(block(s.camera.intrinsics(), nullptr, 0.1));
+      if (request.off_truth) displace(blocks.back(), 3.0, kPointRandom, 100 + request.scene, 6);
+    }
     const Eigen::Vector2d noise = kSigmaPx * request.noise * kPointRandom.normal2(1000 + request.draw);
     return anchored_scene(s, variant, std::move(blocks), (variant.own ? s.anchor : s.observer).pixel + noise);
   };
@@ -103,6 +118,12 @@ inline FactorSubject anchored_subject(const AnchoredVariant& variant, const std:
 inline std::vector<FactorSubject> anchored_subjects() {
   std::vector<FactorSubject> result;
   for (const DistortionModel lens : {DistortionModel::kNone, DistortionModel::kRadtan}) {
+    for (const bool own : {false, true}) {
+      const Variant look{ResidualType::kPinhole, LandmarkType::kBearingInverseDepth, lens};
+      const std::string name =
+          std::string(own ? "Own" : "") + "FreeCamera" + (lens == DistortionModel::kNone ? "" : "Radtan");
+      result.push_back(anchored_subject({look, true, own, true}, name));
+    }
     for (const ResidualType residual : {ResidualType::kPinhole, ResidualType::kUnitSphere}) {
       for (const bool propagated : {true, false}) {
         for (const bool own : {false, true}) {

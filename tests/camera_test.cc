@@ -51,6 +51,22 @@ TEST(Camera, JacobianMatchesDifferences) {
   EXPECT_LT((J * P_C).norm(), 1e-12);
 }
 
+TEST(Camera, IntrinsicsJacobianMatchesDifferences) {
+  const Eigen::Vector3d P_C(0.7, -0.4, 1.9);
+  PinholeCamera lens = kCamera;
+  lens.distortion = Distortion(DistortionModel::kRadtan, {-0.283, 0.074, 2e-4, 2e-5});
+  for (const PinholeCamera& camera : {kCamera, lens}) {
+    EXPECT_EQ(camera.with(camera.intrinsics()).project(P_C), camera.project(P_C));
+    const Eigen::Matrix<double, 2, 4> J = camera.intrinsics_jacobian(*camera.project(P_C));
+    for (int i = 0; i < 4; ++i) {
+      const Intrinsics d = Intrinsics::Unit(i);
+      const Eigen::Vector2d numeric = 0.5 * (*camera.with(camera.intrinsics() + d).project(P_C) -
+                                             *camera.with(camera.intrinsics() - d).project(P_C));
+      EXPECT_LT((J.col(i) - numeric).norm(), 1e-12) << i;  // a picture is linear in them
+    }
+  }
+}
+
 TEST(Camera, BehindOrBesideGivesNothing) {
   for (const Eigen::Vector3d& P_C :
        {Eigen::Vector3d(0.0, 0.0, -1.0), Eigen::Vector3d(0.1, 0.2, -2.0), Eigen::Vector3d(1.0, 0.0, 0.0),

@@ -153,6 +153,32 @@ TEST_F(CommandLine, RunGivesTheCramerRaoBound) {
   EXPECT_THAT(noiseless.err, HasSubstr("scenario.camera.pixel_sigma_px"));
 }
 
+// A camera that is not known is scored where it is free; where it is held nothing is claimed, and the summary says why.
+TEST_F(CommandLine, RunScoresAnUnknownCamera) {
+  const std::string run =
+      "run small.yaml --json --trials 2 --set scenario.camera.td_s=0.01 --set eval.crlb=true --set "
+      "scenario.prior.focal_sigma_px=4 --set scenario.prior.principal_point_sigma_px=4 --set "
+      "estimator.type=sliding_window --set estimator.use=points ";
+  const Result free = plumbline(run + "--out free --set estimator.estimate.intrinsics=true");
+  ASSERT_EQ(free.code, 0) << free.err;
+  const auto metrics = nlohmann::json::parse(free.out)["cells"][0]["metrics"];
+  for (const char* name : {"focal_error_px", "principal_point_error_px", "intrinsics"}) {
+    EXPECT_GT(metrics.at(name)["crlb"], 0.0) << name;
+    EXPECT_GT(metrics.at(name)["rmse"], 0.0) << name;
+  }
+  EXPECT_EQ(metrics["intrinsics"]["nees_dof"], 4);
+  EXPECT_EQ(metrics["calibration"]["nees_dof"], 12);
+
+  const Result held = plumbline(run + "--out held --set estimator.max_cost_per_dof=1e6");
+  ASSERT_EQ(held.code, 0) << held.err;
+  const auto cell = nlohmann::json::parse(held.out)["cells"][0];
+  EXPECT_FALSE(cell["metrics"].contains("intrinsics"));
+  EXPECT_TRUE(cell["metrics"]["td_error_s"].contains("crlb"));
+  EXPECT_FALSE(cell["metrics"]["td_error_s"].contains("nees_dof"));
+  EXPECT_FALSE(cell["metrics"]["td_error_s"].contains("efficiency"));
+  EXPECT_THAT(cell["note"], HasSubstr("the camera is held"));
+}
+
 TEST_F(CommandLine, ReplayGivesTheStoredRow) {
   ASSERT_EQ(plumbline("run small.yaml --out out").code, 0);
   const std::string results = read(folder_ / "out/results.jsonl");

@@ -16,6 +16,7 @@
 #include "bound_problem.h"
 #include "core/random.h"
 #include "estimator/batch_problem.h"
+#include "estimator/estimate.h"
 #include "estimator/factors/imu_factor.h"
 #include "estimator/factors/world_point.h"
 #include "eval/metric_bound.h"
@@ -243,6 +244,58 @@ TEST_F(Bound, CausalBoundFallsToTheFullOne) {
   EXPECT_NEAR(series.back().td_s, *metric_bound(b, "td_error_s"), 1e-5 * series.back().td_s);
   EXPECT_NEAR(series.back().position_m, *metric_bound(b, "final_position"), 1e-5 * series.back().position_m);
   EXPECT_NEAR(core::kDegreesPerRadian * series.back().orientation_rad, *metric_bound(b, "final_orientation_deg"), 1e-5);
+}
+
+TEST_F(Bound, TheCamerasDerivativesAreThoseOfDifferences) {
+  const core::MeasurementLog& l = log();
+  const core::StampedState& at = simulation_.truth.states[nearest_sample(l, l.frames[20].t_cam_ns)];
+  const std::size_t sample = nearest_sample(l, at.t_ns);
+  const auto motion = std::make_shared<estimator::LocalMotion>(l.imu, sample, 0.1, at.state.bias);
+  const estimator::FrameTiming timing{motion, core::to_seconds(l.frames[20].t_cam_ns - at.t_ns)};
+  const core::PointObservation& o = l.frames[20].points.front();
+  const Eigen::Vector3d& P_W =
+      simulation_.truth.landmarks_W[static_cast<std::size_t>(simulation_.truth.track_landmark.at(o.track_id))];
+  const auto observe = [&](const core::Intrinsics& d, estimator::WorldPointJacobians* J) {
+    const estimator::CameraModel model{l.camera.with(l.camera.intrinsics() + d), 0.5, l.gravity_m_s2};
+    return observe_world_point(model, timing, at.state, simulation_.truth.calibration, P_W, o.pixel.y(), J)->pixel;
+  };
+  estimator::WorldPointJacobians J;
+  observe(core::Intrinsics::Zero(), &J);
+  for (int i = 0; i < 4; ++i) {
+    const core::Intrinsics d = 0.1 * core::Intrinsics::Unit(i);
+    const Eigen::Vector2d numeric = (observe(d, nullptr) - observe(-d, nullptr)) / (2.0 * 0.1 * 0.5);
+    // Of a row found to 1e-7 px. The share of the time is some percent.
+    EXPECT_LT((J.intrinsics.col(i) - numeric).norm(), 1e-5) << i;
+  }
+}
+
+// The window's own information, at a minimum that lies next to the truth, since nothing is noisy.
+TEST(CramerRaoBound, OfAnUnknownCameraIsWhatTheWindowStates) {
+  sim::ScenarioConfig c = small_scenario();
+  c.prior.focal_sigma_px = 5.0;
+  c.prior.principal_point_sigma_px = 4.0;
+  auto [log, truth] = sim::simulate(c, {3, 0});
+  c.camera.pixel_sigma_px = 0.0;
+  log.frames = sim::simulate(c, {3, 0}).measurements.frames;
+  log.imu = noise_free_imu(log, truth);
+  estimator::EstimatorConfig config;
+  config.type = estimator::EstimatorType::kSlidingWindow;
+  config.estimate.intrinsics = true;
+  config.window.keyframes = 1000;
+  config.window.keyframe_parallax_px = 0.0;
+  config.window.largest_depth_sigma = 1e6;  // the bound has no belief of depths
+  const core::EstimateLog estimate = estimator::estimate(log, config);
+  ASSERT_EQ(estimate.status, core::SolveStatus::kConverged) << estimate.reason;
+  BoundOptions options{.frames = estimator::select_keyframes(log.frames, config.keyframe_rate_hz), .intrinsics = true};
+  const core::PosteriorCovariance bound = cramer_rao_bound(log, truth, options).covariance;
+  expect_same(estimate.covariance, bound, 0.02);
+  options.intrinsics = false;
+  const core::PosteriorCovariance known = cramer_rao_bound(log, truth, options).covariance;
+  EXPECT_TRUE((known.bottomRightCorner<4, 4>().isZero(0.0)));
+  EXPECT_LT(known(core::kCovTd, core::kCovTd), bound(core::kCovTd, core::kCovTd));
+  // Something is learned of each.
+  const core::CalibrationSigmas& prior = log.prior.calibration_sigma;
+  EXPECT_LT(bound(core::kCovIntrinsics, core::kCovIntrinsics), 0.5 * prior.focal_px * prior.focal_px);
 }
 
 // Samples that dropped out are in the truth and not in the log. The density of the noise stays, so that their loss

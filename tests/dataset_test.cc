@@ -47,7 +47,7 @@ bool same(const core::State& a, const core::State& b) {
 }
 
 bool same(const core::RigCalibration& a, const core::RigCalibration& b) {
-  return same(a.T_B_C, b.T_B_C) && a.td_s == b.td_s && a.readout_s == b.readout_s;
+  return same(a.T_B_C, b.T_B_C) && a.td_s == b.td_s && a.readout_s == b.readout_s && a.intrinsics == b.intrinsics;
 }
 
 bool same(const std::vector<core::ImuSample>& a, const std::vector<core::ImuSample>& b) {
@@ -75,7 +75,8 @@ bool same(const core::InitialPrior& a, const core::InitialPrior& b) {
   return a.t_ns == b.t_ns && same(a.mean, b.mean) && a.sigma.per_axis() == b.sigma.per_axis() &&
          same(a.calibration, b.calibration) && s.td_s == t.td_s && s.readout_s == t.readout_s &&
          s.extrinsic_position_m == t.extrinsic_position_m && s.extrinsic_rotation_rad == t.extrinsic_rotation_rad &&
-         same(a.start, b.start) && same(a.start_calibration, b.start_calibration);
+         s.focal_px == t.focal_px && s.principal_point_px == t.principal_point_px && same(a.start, b.start) &&
+         same(a.start_calibration, b.start_calibration);
 }
 
 void expect_same(const core::MeasurementLog& a, const core::MeasurementLog& b) {
@@ -382,6 +383,49 @@ ScenarioConfig config_with_lines() {
   config.world.lines.random = 400;
   config.lines = {.per_frame = 10, .sigma_px = 0.7, .slide_sigma_px = 2.0, .fragment_probability = 0.02};
   return config;
+}
+
+class UnsureCameraDataset : public Dataset {
+ protected:
+  UnsureCameraDataset()
+      : Dataset([] {
+          ScenarioConfig config = some_config();
+          config.prior.focal_sigma_px = 4.0;
+          config.prior.principal_point_sigma_px = 3.0;
+          return config;
+        }()) {}
+};
+
+TEST_F(UnsureCameraDataset, ReadsBackToTheBit) {
+  const core::MeasurementLog& log = simulation_.measurements;
+  EXPECT_EQ(log.camera.intrinsics(), *log.prior.calibration.intrinsics);
+  EXPECT_NE(log.camera.intrinsics(), *simulation_.truth.calibration.intrinsics);
+  expect_same(core::read_dataset(folder_), log);
+  expect_same(read_truth(folder_), simulation_.truth);
+}
+
+TEST_F(UnsureCameraDataset, TellsTheTruthInTheTruthOnly) {
+  fs::remove_all(folder_ / "truth");
+  for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
+    if (entry.path().extension() == ".yaml")
+      EXPECT_THAT(text(entry.path()), testing::Not(HasSubstr("460.0"))) << entry.path();
+  }
+}
+
+TEST_F(UnsureCameraDataset, RefusesAPriorThatIsNotOfItsCamera) {
+  std::string prior = text("prior.yaml");
+  const std::string with = prior;
+  const auto replace_line = [&](const std::string& key, const std::string& line) {
+    prior = with;
+    const std::size_t at = prior.find(key);
+    ASSERT_NE(at, std::string::npos);
+    prior.replace(at, prior.find('\n', at) - at, line);
+    rewrite("prior.yaml", prior);
+  };
+  replace_line("intrinsics_px", "intrinsics_px: [460, 460, 320, 240]");
+  EXPECT_THAT(refusal(), HasSubstr("calibration.intrinsics_px: must be those of mav0/cam0/sensor.yaml"));
+  replace_line("focal_px: ", "");
+  EXPECT_THAT(refusal(), HasSubstr("calibration_sigma.focal_px"));
 }
 
 class LineDataset : public Dataset {

@@ -27,7 +27,8 @@ sim::GroundTruth make_truth() {
   sim::GroundTruth truth;
   truth.calibration = {.T_B_C = {core::exp_quaternion(Eigen::Vector3d(1.0, -0.5, 0.3)), {0.05, -0.02, 0.01}},
                        .td_s = 0.01,
-                       .readout_s = 0.02};
+                       .readout_s = 0.02,
+                       .intrinsics = core::Intrinsics(460.0, 458.0, 320.0, 240.0)};
   for (int k = 0; k < kStates * kStatesEvery; ++k) {
     const TimeNs t_ns = 1403636580'000000000 + k * kImuStep;
     const double u = core::to_seconds(k * kImuStep);
@@ -87,6 +88,7 @@ class Evaluate : public testing::Test {
     c.T_B_C.q = c.T_B_C.q * core::exp_quaternion(error_.segment<3>(core::kCovExtrinsicRotation));
     c.td_s += error_(core::kCovTd);
     c.readout_s += error_(core::kCovReadout);
+    *c.intrinsics += error_.segment<4>(core::kCovIntrinsics);
     core::State& last = estimate_.states.back().state;
     last = core::plus(last, error_.segment<core::kStateDof>(core::kCovLastState));
   }
@@ -141,16 +143,18 @@ TEST_F(Evaluate, NeesIsOfTheRightBlockAndDimension) {
   const TrialResult result = evaluate();
   for (const Block& b :
        {Block{"extrinsic_position_m", 0, 3}, Block{"extrinsic_rotation_deg", 3, 3}, Block{"extrinsic", 0, 6},
-        Block{"td_error_s", 6, 1}, Block{"readout_error_s", 7, 1}, Block{"calibration", 0, 8},
-        Block{"final_pose", 8, 6}, Block{"final_position", 8, 3}, Block{"final_orientation_deg", 11, 3},
-        Block{"final_velocity", 14, 3}, Block{"final_gyro_bias", 17, 3}, Block{"final_accel_bias", 20, 3},
-        Block{"final_bias", 17, 6}, Block{"final_state", 8, 15}, Block{"joint", 0, 23}}) {
+        Block{"td_error_s", 6, 1}, Block{"readout_error_s", 7, 1}, Block{"focal_error_px", 23, 2},
+        Block{"principal_point_error_px", 25, 2}, Block{"intrinsics", 23, 4}, Block{"final_pose", 8, 6},
+        Block{"final_position", 8, 3}, Block{"final_orientation_deg", 11, 3}, Block{"final_velocity", 14, 3},
+        Block{"final_gyro_bias", 17, 3}, Block{"final_accel_bias", 20, 3}, Block{"final_bias", 17, 6},
+        Block{"final_state", 8, 15}, Block{"joint", 0, 27}}) {
     const Eigen::VectorXd e = error_.segment(b.offset, b.dof);
     const Eigen::MatrixXd P = estimate_.covariance.block(b.offset, b.offset, b.dof, b.dof);
     const Metric& m = metric(result, b.name);
     EXPECT_EQ(m.nees_dof, b.dof) << b.name;
     EXPECT_NEAR(m.nees.value_or(0.0) / e.dot(P.ldlt().solve(e)), 1.0, 1e-8) << b.name;
   }
+  EXPECT_EQ(metric(result, "calibration").nees_dof, 12);
   EXPECT_FALSE(metric(result, "ate_position_m").nees.has_value());
   EXPECT_FALSE(metric(result, "ate_rotation_deg").nees.has_value());
 }
@@ -239,6 +243,15 @@ TEST_F(Evaluate, WithoutAnEstimateThereIsNoNees) {
   }
   EXPECT_NEAR(metric(result, "td_error_s").value, error_(core::kCovTd), 1e-15);
   EXPECT_TRUE(metric(result, "final_pose").nees.has_value());
+}
+
+TEST_F(Evaluate, IntrinsicsThatWereHeldHaveNoMetric) {
+  estimate_.calibration.intrinsics.reset();
+  const TrialResult result = evaluate();
+  ASSERT_TRUE(result.ok) << result.reason;
+  EXPECT_EQ(metric(result, "calibration").nees_dof, 8);
+  EXPECT_EQ(metric(result, "joint").nees_dof, 23);
+  for (const Metric& m : result.metrics) EXPECT_EQ(m.name.find("_px"), std::string::npos) << m.name;
 }
 
 TEST_F(Evaluate, AnEstimatorWithoutCovarianceIsScoredWithoutNees) {
@@ -338,7 +351,7 @@ TEST_F(Evaluate, SeriesHoldsTheTrialOnAGrid) {
 TEST_F(Evaluate, OnlineNeesIsUnalignedAndPerBlock) {
   core::StateTangent e;
   e.setLinSpaced(-1e-3, 2e-3);
-  const core::StateCovariance P = estimate_.covariance.bottomRightCorner<15, 15>();
+  const core::StateCovariance P = estimate_.covariance.block<15, 15>(core::kCovLastState, core::kCovLastState);
   for (const std::size_t k : {400U, 800U}) {
     const auto& [t_ns, x] = truth_.states[k];
     estimate_.state_history.push_back({t_ns, core::plus(x, e), P});

@@ -80,7 +80,7 @@ TEST(LineBatch, EachUseRecoversTdReadoutAndExtrinsics) {
   }
   const auto& [both, points, lines] = estimates;
   // More measurements, less variance.
-  for (int i = 0; i < core::kCovDim; ++i) {
+  for (int i = 0; i < core::kCovIntrinsics; ++i) {
     EXPECT_LT(both.covariance(i, i), points.covariance(i, i)) << i;
     EXPECT_LT(both.covariance(i, i), lines.covariance(i, i)) << i;
   }

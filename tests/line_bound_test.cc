@@ -96,7 +96,7 @@ TEST_F(LineBound, IsOfWhatIsUsed) {
   const CramerRaoBound both = bound(s, {});
   const CramerRaoBound points = bound(s, {.frames = {}, .lines = false});
   const CramerRaoBound lines = bound(s, {.frames = {}, .points = false});
-  for (int i = 0; i < core::kCovDim; ++i) {
+  for (int i = 0; i < core::kCovIntrinsics; ++i) {
     EXPECT_LT(both.covariance(i, i), points.covariance(i, i)) << i;
     EXPECT_LT(both.covariance(i, i), lines.covariance(i, i)) << i;
   }

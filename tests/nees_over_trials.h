@@ -34,8 +34,8 @@ class NeesOverTrials {
     ++trials_;
   }
 
-  void expect_inside_bands() const {
-    EXPECT_EQ(nees_.at(1.0).at("joint").dof, core::kCovDim);
+  void expect_inside_bands(int joint_dof = core::kCovIntrinsics) const {
+    EXPECT_EQ(nees_.at(1.0).at("joint").dof, joint_dof);
     for (const auto& [name, nees] : nees_.at(1.0)) {
       const eval::Interval band = band_of(name);
       const double mean = eval::mean(nees.values);

@@ -84,4 +84,15 @@ struct PlainScalarPrior {
   }
 };
 
+struct PlainIntrinsicsPrior {
+  Eigen::Vector4d mean;
+  Eigen::Vector4d sigma;
+
+  template <class T>
+  bool operator()(const T* x, T* residual) const {
+    for (int i = 0; i < 4; ++i) residual[i] = (T(mean[i]) - x[i]) / T(sigma[i]);
+    return true;
+  }
+};
+
 }  // namespace plumbline::testing

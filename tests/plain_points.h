@@ -86,8 +86,22 @@ struct PlainPropagatedPoint {
   template <class T>
   bool operator()(const T* x_i, const T* x_j, const T* x_c, const T* td, const T* readout, const T* x_l,
                   T* residual) const {
-    double row = observed_pixel.y();
+    const Row at = row_of(x_i, x_j, x_c, td, readout, x_l);
+    const T defect = pixel(x_i, x_j, x_c, td, readout, x_l, T(at.row)).y() - T(at.row);
+    const Vector3<T> q = ray(x_i, x_j, x_c, td, readout, x_l, T(at.row) + defect / T(at.slope));
+    Eigen::Map<Vector2<T>> r(residual);
+    r = reduction(q, Vector3<T>(plain_bearing<double>(reduction.camera, observed_pixel).cast<T>()));
+    return true;
+  }
+
+  // The predicted row, and 1 - d(row of the point seen at its time)/d row.
+  struct Row {
+    double row;
     double slope = 1.0;
+  };
+  template <class T>
+  Row row_of(const T* x_i, const T* x_j, const T* x_c, const T* td, const T* readout, const T* x_l) const {
+    Row at{observed_pixel.y()};
     for (int i = 0; i < 20; ++i) {
       // With respect to the row alone.
       using Jet = ceres::Jet<double, 1>;
@@ -97,24 +111,12 @@ struct PlainPropagatedPoint {
         return y;
       };
       const Jet v = pixel<Jet>(plain(x_i, 16).data(), plain(x_j, 16).data(), plain(x_c, 7).data(), plain(td, 1).data(),
-                               plain(readout, 1).data(), plain(x_l, anchor_pixel ? 1 : 3).data(), Jet(row, 0))
+                               plain(readout, 1).data(), plain(x_l, anchor_pixel ? 1 : 3).data(), Jet(at.row, 0))
                         .y();
-      slope = 1.0 - v.v[0];
-      row += (v.a - row) / slope;
+      at.slope = 1.0 - v.v[0];
+      at.row += (v.a - at.row) / at.slope;
     }
-    const T defect = pixel(x_i, x_j, x_c, td, readout, x_l, T(row)).y() - T(row);
-    const T predicted_row = T(row) + defect / T(slope);
-    const Vector3<T> q = ray(x_i, x_j, x_c, td, readout, x_l, predicted_row);
-    Eigen::Map<Vector2<T>> r(residual);
-    r = reduction(q, Vector3<T>(plain_bearing<double>(reduction.camera, observed_pixel).cast<T>()));
-    return true;
-  }
-
- private:
-  template <class T>
-  T tau(const PlainFrame& frame, const T& td, const T& readout, const T& row) const {
-    const double rows = reduction.camera.height_px;
-    return T(frame.offset_s) + td + (row - T(rows / 2.0)) / T(rows) * readout;
+    return at;
   }
 
   template <class T>
@@ -131,10 +133,41 @@ struct PlainPropagatedPoint {
     return plain_transfer(l, c, c, i, j);
   }
 
+ private:
+  template <class T>
+  T tau(const PlainFrame& frame, const T& td, const T& readout, const T& row) const {
+    const double rows = reduction.camera.height_px;
+    return T(frame.offset_s) + td + (row - T(rows / 2.0)) / T(rows) * readout;
+  }
+
   template <class T>
   Vector2<T> pixel(const T* x_i, const T* x_j, const T* x_c, const T* td, const T* readout, const T* x_l,
                    const T& row) const {
     return plain_pixel(reduction.camera, ray(x_i, x_j, x_c, td, readout, x_l, row));
+  }
+};
+
+// estimator/factors/anchored_point.h with the camera's (fx, fy, cx, cy) estimated; pixels, a carried camera.
+struct PlainFreeCameraPoint {
+  PlainPropagatedPoint plain;
+
+  template <class T>
+  bool operator()(const T* x_i, const T* x_j, const T* x_c, const T* td, const T* readout, const T* x_l, const T* K,
+                  T* residual) const {
+    const core::Distortion& lens = plain.reduction.camera.distortion;
+    const auto seen = [&](const Vector3<T>& q) {
+      const Vector2<T> xy = plain_distort<T>(lens, {q.x() / q.z(), q.y() / q.z()});
+      return Vector2<T>(K[0] * xy.x() + K[2], K[1] * xy.y() + K[3]);
+    };
+    PlainPropagatedPoint fixed = plain;
+    fixed.reduction.camera =
+        plain.reduction.camera.with({value_of(K[0]), value_of(K[1]), value_of(K[2]), value_of(K[3])});
+    const auto at = fixed.row_of(x_i, x_j, x_c, td, readout, x_l);
+    const auto ray = [&](const T& row) { return fixed.ray(x_i, x_j, x_c, td, readout, x_l, row); };
+    const T defect = seen(ray(T(at.row))).y() - T(at.row);
+    Eigen::Map<Vector2<T>> r(residual);
+    r = (seen(ray(T(at.row) + defect / T(at.slope))) - plain.observed_pixel.cast<T>()) / T(plain.reduction.sigma_px);
+    return true;
   }
 };
 
@@ -182,9 +215,9 @@ template <class Plain>
 struct PlainOwn {
   Plain plain;
 
-  template <class T>
-  bool operator()(const T* x, const T* x_c, const T* td, const T* readout, const T* x_l, T* residual) const {
-    return plain(x, x, x_c, td, readout, x_l, residual);
+  template <class T, class... Rest>
+  bool operator()(const T* x, Rest... rest) const {
+    return plain(x, x, rest...);
   }
 };
 

@@ -59,6 +59,16 @@ inline FactorScene scalar_prior_scene(const SceneRequest& request) {
           {scalar_block(truth, 0.01)}};
 }
 
+inline FactorScene intrinsics_prior_scene(const SceneRequest& request) {
+  const core::Intrinsics truth(460.0, 455.0 + static_cast<double>(request.scene), 320.0, 240.0);
+  const auto n = kStateRandom.normals(7000 + request.draw);
+  const core::Intrinsics sigma(4.0, 4.0, 3.0, 3.0);
+  const core::Intrinsics mean = truth + request.noise * core::Intrinsics(n[0], n[1], n[2], n[3]).cwiseProduct(sigma);
+  return {std::make_unique<estimator::IntrinsicsPriorFactor>(mean, 4.0, 3.0),
+          automatic<PlainIntrinsicsPrior, 4, 4>({mean, sigma}),
+          {block(truth, nullptr, 0.1)}};
+}
+
 // Angles between a mean and what is estimated: none, where the series begin and end, and nearly half a turn, where the
 // rotation vector is about to change its side.
 inline constexpr double kPriorAngles[] = {0.0, 1e-9, 0.03, 0.04, std::numbers::pi - 1e-3, std::numbers::pi - 1e-9};
@@ -90,6 +100,12 @@ inline std::vector<FactorScene> scalar_prior_limits() {
   return limits;
 }
 
+inline std::vector<FactorScene> intrinsics_prior_limits() {
+  std::vector<FactorScene> limits;
+  limits.push_back(intrinsics_prior_scene(SceneRequest{.scene = 1}));
+  return limits;
+}
+
 inline std::vector<FactorSubject> prior_subjects() {
   return {
       {.name = "StatePrior", .scene = state_prior_scene, .limits = state_prior_limits},
@@ -98,6 +114,10 @@ inline std::vector<FactorSubject> prior_subjects() {
        .limits = extrinsics_prior_limits,
        .in_world = false},
       {.name = "ScalarPrior", .scene = scalar_prior_scene, .limits = scalar_prior_limits, .in_world = false},
+      {.name = "IntrinsicsPrior",
+       .scene = intrinsics_prior_scene,
+       .limits = intrinsics_prior_limits,
+       .in_world = false},
   };
 }
 

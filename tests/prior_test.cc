@@ -138,6 +138,32 @@ TEST(Prior, StartIsTheMeanUnlessDrawn) {
   EXPECT_GT((error_of(drawn.start, drawn.start_calibration, truth) - mean).cwiseAbs().minCoeff(), 0.0);
 }
 
+TEST(Prior, DrawsTheCameraAndLeavesTheOtherDraws) {
+  GroundTruth truth = some_truth();
+  const ScenarioConfig known = some_config();
+  ScenarioConfig config = known;
+  config.prior.focal_sigma_px = 4.0;
+  config.prior.principal_point_sigma_px = 3.0;
+  EXPECT_FALSE(known.calibration().intrinsics);
+  truth.calibration.intrinsics = config.calibration().intrinsics;
+  const core::Intrinsics sigma(4.0, 4.0, 3.0, 3.0);
+  constexpr int kTrials = 2000;
+  Eigen::Matrix4d product = Eigen::Matrix4d::Zero();
+  for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+    const core::InitialPrior prior = make_prior(truth, config, {.seed = 1, .trial = trial});
+    const core::Intrinsics e = (*prior.calibration.intrinsics - *truth.calibration.intrinsics).cwiseQuotient(sigma);
+    product += e * e.transpose();
+    if (trial > 3) continue;
+    const core::InitialPrior without = make_prior(some_truth(), known, {.seed = 1, .trial = trial});
+    EXPECT_FALSE(without.calibration.intrinsics);
+    EXPECT_EQ(error_of(prior.mean, prior.calibration, truth), error_of(without.mean, without.calibration, truth));
+  }
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_LT(std::abs(chi_square_score(product(i, i), kTrials)), kLargestScore) << i;
+    for (int j = 0; j < i; ++j) EXPECT_LT(std::abs(product(i, j)) / std::sqrt(kTrials), kLargestScore) << i << ' ' << j;
+  }
+}
+
 // Of td and the readout, each alone.
 TEST(Prior, AFixedMeanLeavesTheOtherDraws) {
   const GroundTruth truth = some_truth();

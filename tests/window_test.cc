@@ -104,6 +104,10 @@ std::vector<Look> looks() {
   held.config.estimate = {.td = false, .readout = false, .extrinsics = false};
   held.scenario.prior.means = sim::PriorMeans::kTruth;
   result.push_back(held);
+  Look camera{"camera", scenario, config};
+  camera.config.estimate.intrinsics = true;
+  camera.scenario.prior.focal_sigma_px = camera.scenario.prior.principal_point_sigma_px = 5.0;
+  result.push_back(camera);
   Look lines{"lines", scenario, config};
   lines.scenario.world.type = sim::WorldType::kRooms;
   lines.scenario.lines.per_frame = 8;

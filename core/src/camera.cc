@@ -6,6 +6,21 @@
 
 namespace plumbline::core {
 
+PinholeCamera PinholeCamera::with(const Intrinsics& K) const {
+  PinholeCamera camera = *this;
+  camera.fx_px = K[0];
+  camera.fy_px = K[1];
+  camera.cx_px = K[2];
+  camera.cy_px = K[3];
+  return camera;
+}
+
+Eigen::Matrix<double, 2, 4> PinholeCamera::intrinsics_jacobian(const Eigen::Vector2d& pixel) const {
+  Eigen::Matrix<double, 2, 4> J;
+  J << (pixel.x() - cx_px) / fx_px, 0.0, 1.0, 0.0, 0.0, (pixel.y() - cy_px) / fy_px, 0.0, 1.0;
+  return J;
+}
+
 std::optional<Eigen::Vector2d> PinholeCamera::project(const Eigen::Vector3d& P_C,
                                                       Eigen::Matrix<double, 2, 3>* J) const {
   // Nearer than a millionth of its lateral distance to the image plane is not in front of any real camera.

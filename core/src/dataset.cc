@@ -87,6 +87,7 @@ void visit(ConfigVisitor& v, RigCalibration& c) {
   v.section("T_B_C", c.T_B_C, "extrinsics");
   v.value("td_s", c.td_s, within(kMostTimeOffsetS), "middle row");
   v.value("readout_s", c.readout_s, within(kMostTimeOffsetS), "first row to last");
+  if (c.intrinsics) v.value("intrinsics_px", *c.intrinsics, within(1e6), "fx, fy, cx, cy");
 }
 
 static void visit(ConfigVisitor& v, State& c) {
@@ -109,6 +110,10 @@ static void visit(ConfigVisitor& v, CalibrationSigmas& c) {
   v.value("readout_s", c.readout_s, up_to(kMostTimeOffsetSigmaS), "first row to last");
   v.value("extrinsic_position_m", c.extrinsic_position_m, up_to(kMostM), "each axis");
   v.value("extrinsic_rotation_rad", c.extrinsic_rotation_rad, up_to(kMostAngleRad), "each axis");
+  if (c.has_intrinsics()) {
+    v.value("focal_px", c.focal_px, up_to(kMostPixels), "of fx and fy");
+    v.value("principal_point_px", c.principal_point_px, up_to(kMostPixels), "of cx and cy");
+  }
 }
 
 static void visit(ConfigVisitor& v, InitialPrior& c) {
@@ -254,6 +259,12 @@ void check_prior(const MeasurementLog& log, const ConfigTree& tree) {
   require_unit(prior.start.T_W_B, "start.T_W_B");
   require_unit(prior.calibration.T_B_C, "calibration.T_B_C");
   require_unit(prior.start_calibration.T_B_C, "start_calibration.T_B_C");
+  if (prior.calibration.intrinsics) {
+    require(*prior.calibration.intrinsics == log.camera.intrinsics(), "calibration.intrinsics_px",
+            fmt::format("must be those of {}", kCameraSensor));
+    require(prior.start_calibration.intrinsics->head<2>().minCoeff() > 0.0, "start_calibration.intrinsics_px",
+            "must have positive focal lengths");
+  }
   require(std::binary_search(log.imu.begin(), log.imu.end(), ImuSample{.t_ns = prior.t_ns},
                              [](const ImuSample& a, const ImuSample& b) { return a.t_ns < b.t_ns; }),
           "t_ns", fmt::format("{} is not the stamp of an IMU sample", prior.t_ns));
@@ -338,7 +349,13 @@ MeasurementLog read_dataset(const std::filesystem::path& folder) {
   log.line_sigma_px = camera.line_sigma_px.value_or(0.0);
   log.imu_noise = read_yaml<ImuSensorFile>(folder / kImuSensor).noise;
   const ConfigTree prior = load_config_file(folder / "prior.yaml");
-  log.prior = read_all_keys<InitialPrior>(prior);
+  InitialPrior prior_keys;
+  if (find_value(prior, "calibration.intrinsics_px") != nullptr ||
+      find_value(prior, "calibration_sigma.focal_px") != nullptr) {
+    prior_keys.calibration.intrinsics = prior_keys.start_calibration.intrinsics = Intrinsics::Zero();
+    prior_keys.calibration_sigma.focal_px = 1.0;
+  }
+  log.prior = read_all_keys(prior, prior_keys);
 
   CsvReader imu(folder / kImuFile, 7);
   while (imu.next()) {

@@ -20,6 +20,9 @@ static void visit(core::ConfigVisitor& v, EstimateWhat& c) {
   v.value("td", c.td, "the time offset");
   v.value("readout", c.readout, "the readout time");
   v.value("extrinsics", c.extrinsics, "T_B_C");
+  v.value(
+      "intrinsics", c.intrinsics,
+      "fx, fy, cx and cy; only of `sliding_window` with points `bearing_inverse_depth`, `propagated` and `pinhole`");
 }
 
 static void visit(core::ConfigVisitor& v, LineRules& c) {

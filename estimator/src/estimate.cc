@@ -59,6 +59,18 @@ void require_usable(const EstimatorConfig& config, const BelievedNoise& noise, c
     require_weight(sigma.extrinsic_position_m, "scenario.prior.extrinsic_position_sigma_m", width);
     require_weight(sigma.extrinsic_rotation_rad, "scenario.prior.extrinsic_rotation_sigma_rad", width);
   }
+  if (free.intrinsics) {
+    const bool points_alone = uses_points(config.use) && !(uses_lines(config.use) && has_lines);
+    if (config.type != EstimatorType::kSlidingWindow || config.timing != TimingModel::kPropagated ||
+        config.residual != ResidualType::kPinhole || config.landmark != LandmarkType::kBearingInverseDepth ||
+        !points_alone) {
+      throw core::RuleError({"estimator.estimate.intrinsics",
+                             "needs estimator.type: sliding_window, timing: propagated, residual: pinhole, landmark: "
+                             "bearing_inverse_depth, and points without lines"});
+    }
+    require_weight(sigma.focal_px, "scenario.prior.focal_sigma_px", width);
+    require_weight(sigma.principal_point_px, "scenario.prior.principal_point_sigma_px", width);
+  }
 }
 
 core::EstimateLog estimate(const core::MeasurementLog& log, const EstimatorConfig& config) {

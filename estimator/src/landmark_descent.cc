@@ -82,8 +82,8 @@ class Descent {
     V_.setZero(block_.dof, block_.dof);
     h_.setZero(block_.dof);
     for (const ResidualTerm& term : terms_) {
-      std::array<const double*, 6> parameters = {};
-      std::array<double*, 6> jacobians = {};
+      std::array<const double*, kMostBlocks> parameters = {};
+      std::array<double*, kMostBlocks> jacobians = {};
       std::array<double, 2 * kMostSize> ambient;
       for (int b = 0; b < term.count; ++b) {
         const auto i = static_cast<std::size_t>(b);

@@ -18,7 +18,7 @@ int eliminated_block(const LeastSquares& problem, const ResidualTerm& term) {
 }
 
 bool evaluate(const LeastSquares& problem, const ResidualTerm& term, double* residuals) {
-  std::array<const double*, 6> parameters = {};
+  std::array<const double*, kMostBlocks> parameters = {};
   for (std::size_t b = 0; b < static_cast<std::size_t>(term.count); ++b) {
     parameters[b] = problem.blocks[static_cast<std::size_t>(term.blocks[b])].values;
   }

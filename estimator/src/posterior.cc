@@ -1,5 +1,7 @@
 #include "estimator/posterior.h"
 
+#include <vector>
+
 #include <Eigen/Core>
 
 namespace plumbline::estimator {
@@ -7,18 +9,18 @@ namespace plumbline::estimator {
 std::optional<core::PosteriorCovariance> posterior_covariance(SchurSystem& system, const EstimateWhat& free) {
   if (!system.solved_undamped() && !(system.build(0.0) && system.solve())) return std::nullopt;
   // L = [ L11 0; L21 L22 ], so that the last rows and columns of (L L^T)^-1 are (L22 L22^T)^-1.
-  constexpr int kCalibration = core::kCovLastState;
-  const Eigen::MatrixXd L = system.trailing_factor(core::kCovDim);
-  const Eigen::MatrixXd inverse =
-      L.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(core::kCovDim, core::kCovDim));
-  const Eigen::MatrixXd P = inverse.transpose() * inverse;
-  core::PosteriorCovariance covariance;
-  covariance.bottomRightCorner<core::kStateDof, core::kStateDof>() =
-      P.topLeftCorner<core::kStateDof, core::kStateDof>();
-  covariance.topLeftCorner<kCalibration, kCalibration>() = P.bottomRightCorner<kCalibration, kCalibration>();
-  covariance.bottomLeftCorner<core::kStateDof, kCalibration>() = P.topRightCorner<core::kStateDof, kCalibration>();
-  covariance.topRightCorner<kCalibration, core::kStateDof>() =
-      covariance.bottomLeftCorner<core::kStateDof, kCalibration>().transpose();
+  std::vector<int> rows;  // of the covariance
+  const auto add_rows = [&](int first, int count) {
+    for (int i = 0; i < count; ++i) rows.push_back(first + i);
+  };
+  add_rows(core::kCovLastState, core::kStateDof);
+  add_rows(0, core::kCovLastState);
+  if (free.intrinsics) add_rows(core::kCovIntrinsics, core::kCovDim - core::kCovIntrinsics);
+  const int n = static_cast<int>(rows.size());
+  const Eigen::MatrixXd L = system.trailing_factor(n);
+  const Eigen::MatrixXd inverse = L.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(n, n));
+  core::PosteriorCovariance covariance = core::PosteriorCovariance::Zero();
+  covariance(rows, rows) = inverse.transpose() * inverse;
   const auto hold = [&](int first, int count, bool is_free) {
     if (is_free) return;
     covariance.middleRows(first, count).setZero();

@@ -14,8 +14,7 @@ namespace plumbline::estimator {
 namespace {
 
 constexpr int kMaxRows = core::kStateDof;
-constexpr int kMaxBlocks = 6;
-constexpr int kMaxWidth = 2 * core::kStateDof + 8 + kLandmarkSize;  // two states, the calibration, a point that stays
+constexpr int kMaxWidth = 2 * core::kStateDof + 12 + kLandmarkSize;  // two states, the calibration, a point that stays
 
 bool has_rotation(const ParameterBlock& block) { return block.size == kStateSize || block.size == kPoseSize; }
 
@@ -31,7 +30,7 @@ struct SchurSystem::Rows {
   int rows = 0;
   Eigen::Matrix<double, kMaxRows, 1> r;
   int runs = 0;
-  std::array<Run, kMaxBlocks> run;
+  std::array<Run, kMostBlocks> run;
   int width = 0;
   std::array<double, kMaxRows * kMaxWidth> J;  // rows x kMaxWidth, row-major
   int landmark = -1;                           // block
@@ -98,9 +97,9 @@ bool SchurSystem::evaluate(const ResidualTerm& term, Rows& rows) const {
   const int m = rows.rows = term.factor->num_residuals();
   rows.landmark = -1;
   rows.runs = rows.width = 0;
-  std::array<const double*, kMaxBlocks> parameters = {};
-  std::array<double*, kMaxBlocks> jacobians = {};
-  std::array<std::array<double, kMaxRows * kStateSize>, kMaxBlocks> ambient;
+  std::array<const double*, kMostBlocks> parameters = {};
+  std::array<double*, kMostBlocks> jacobians = {};
+  std::array<std::array<double, kMaxRows * kStateSize>, kMostBlocks> ambient;
   for (int b = 0; b < term.count; ++b) {
     const auto i = static_cast<std::size_t>(b);
     const ParameterBlock& block = problem_.blocks[static_cast<std::size_t>(term.blocks[i])];

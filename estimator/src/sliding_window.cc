@@ -137,7 +137,7 @@ class OnlineEstimate {
 
   void record(core::TimeNs t_ns) {
     const core::State state = unpack_state(window_.newest().x.data());
-    const auto P = covariance_.bottomRightCorner<core::kStateDof, core::kStateDof>();
+    const auto P = covariance_.block<core::kStateDof, core::kStateDof>(core::kCovLastState, core::kCovLastState);
     // Frames that an earlier td put later than this one now lies.
     const auto later = [&](const auto& entry) { return entry.t_ns >= t_ns; };
     std::erase_if(result_.states, later);

@@ -23,6 +23,7 @@ Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config)
       extrinsics_(pack(log.prior.start_calibration.T_B_C)),
       td_s_(log.prior.start_calibration.td_s),
       readout_s_(log.prior.start_calibration.readout_s),
+      intrinsics_(log.camera.intrinsics()),
       timing_td_s_(config.state_td_s.value_or(td_s_)),
       usual_depth_(config.window.usual_depth_m),
       usual_depth_of_fixed_(config.window.usual_depth_m),
@@ -52,10 +53,18 @@ Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config)
   if (config.estimate.readout) {
     initial_.push_back({std::make_unique<ScalarPriorFactor>(mean.readout_s, sigma.readout_s), &readout_s_});
   }
+  if (config.estimate.intrinsics) {
+    intrinsics_ = log.prior.start_calibration.intrinsics.value();
+    initial_.push_back(
+        {std::make_unique<IntrinsicsPriorFactor>(mean.intrinsics.value(), sigma.focal_px, sigma.principal_point_px),
+         intrinsics_.data()});
+  }
 }
 
 core::RigCalibration Window::calibration() const {
-  return {.T_B_C = unpack_pose(extrinsics_.data()), .td_s = td_s_, .readout_s = readout_s_};
+  core::RigCalibration calibration{.T_B_C = unpack_pose(extrinsics_.data()), .td_s = td_s_, .readout_s = readout_s_};
+  if (config_.estimate.intrinsics) calibration.intrinsics = intrinsics_;
+  return calibration;
 }
 
 FrameTiming Window::timing_of(const WindowFrame& frame, const core::ImuBias& bias) const {
@@ -154,26 +163,25 @@ std::unique_ptr<const ceres::CostFunction> Window::make_factor(const WindowPoint
     return make_point_factor(point_model_, {point.anchor->timing, first.pixel, first.velocity},
                              {o.frame->timing, o.pixel, o.velocity});
   }
-  const bool own = o.frame == point.anchor;
-  if (config_.timing == TimingModel::kPropagated) {
-    PropagatedSight sight(camera, o.frame->timing, o.pixel);
-    if (own) return std::make_unique<OwnAnchoredPoint<PropagatedSight>>(std::move(sight), point.T_B_A);
-    return std::make_unique<AnchoredPoint<PropagatedSight>>(std::move(sight), point.T_B_A);
-  }
-  const VelocitySight sight(RayChart(camera.residual, camera.camera, camera.pixel_sigma_px, o.pixel),
-                            MovingBearing(camera.camera, o.frame->timing.offset_s, o.pixel, *o.velocity));
-  if (own) return std::make_unique<OwnAnchoredPoint<VelocitySight>>(sight, point.T_B_A);
-  return std::make_unique<AnchoredPoint<VelocitySight>>(sight, point.T_B_A);
+  const auto by = [&]<class Sight>(Sight sight) -> std::unique_ptr<const ceres::CostFunction> {
+    if (o.frame == point.anchor) return std::make_unique<OwnAnchoredPoint<Sight>>(std::move(sight), point.T_B_A);
+    return std::make_unique<AnchoredPoint<Sight>>(std::move(sight), point.T_B_A);
+  };
+  if (config_.estimate.intrinsics) return by(FreeCameraSight(camera, o.frame->timing, o.pixel));
+  if (config_.timing == TimingModel::kPropagated) return by(PropagatedSight(camera, o.frame->timing, o.pixel));
+  return by(VelocitySight(RayChart(camera.residual, camera.camera, camera.pixel_sigma_px, o.pixel),
+                          MovingBearing(camera.camera, o.frame->timing.offset_s, o.pixel, *o.velocity)));
 }
 
 std::optional<Eigen::Vector2d> Window::residual_of(const WindowPoint& point, const WindowObservation& o,
                                                    const Eigen::Vector3d& landmark) const {
-  std::array<const double*, 6> parameters = {};
+  std::array<const double*, kMostBlocks> parameters = {};
   std::size_t n = 0;
   parameters[n++] = point.anchor->x.data();
   if (!is_free_point() || o.frame != point.anchor) parameters[n++] = o.frame->x.data();
   for (const double* calibration : {extrinsics_.data(), &td_s_, &readout_s_}) parameters[n++] = calibration;
   parameters[n++] = is_free_point() ? landmark.data() : &landmark.z();
+  parameters[n++] = intrinsics_.data();  // of factors that estimate them
   Eigen::Vector2d residual;
   if (!o.factor->Evaluate(parameters.data(), residual.data(), nullptr)) return std::nullopt;
   return residual;
@@ -220,7 +228,7 @@ void Window::triangulate() {
     for (const WindowObservation& o : point.observations) {
       views.push_back({camera_pose(*o.frame, o.pixel.y()), o.pixel});
     }
-    point.landmark = estimator::triangulate(log_.camera, views);
+    point.landmark = estimator::triangulate(camera(), views);
     point.anchor = point.observations.front().frame;
     point.T_B_A = unpack_pose(extrinsics_.data());
     if (is_free_point()) {
@@ -243,7 +251,7 @@ void Window::triangulate() {
       views.push_back({View{camera_pose(*o.frame, o.ends_px[0].y()), o.ends_px[0]},
                        View{camera_pose(*o.frame, o.ends_px[1].y()), o.ends_px[1]}});
     }
-    const TriangulatedLine start = triangulate_line(log_.camera, views, rules);
+    const TriangulatedLine start = triangulate_line(camera(), views, rules);
     if (!start.line) continue;
     line.value = LineValue{start.origin_W, *start.line};
     for (WindowLineObservation& o : line.observations) {
@@ -293,6 +301,7 @@ std::optional<double> Window::parallax_of_newest_px() const {
   const auto rotation = [&](const WindowFrame& frame, double row_px) {
     return Eigen::Quaterniond(camera_pose(frame, row_px).q);
   };
+  const core::PinholeCamera model = camera();
   std::vector<double> moved;
   for (const auto& [id, point] : points_) {
     const std::size_t n = point.observations.size();
@@ -300,8 +309,8 @@ std::optional<double> Window::parallax_of_newest_px() const {
     const Eigen::Vector2d& from = point.observations[n - 2].pixel;
     const Eigen::Vector2d& to = point.observations[n - 1].pixel;
     const Eigen::Vector3d ray =
-        rotation(*newest, to.y()).conjugate() * (rotation(*before, from.y()) * log_.camera.unproject(from));
-    if (const auto turned = log_.camera.project(ray)) moved.push_back((to - *turned).squaredNorm());
+        rotation(*newest, to.y()).conjugate() * (rotation(*before, from.y()) * model.unproject(from));
+    if (const auto turned = model.project(ray)) moved.push_back((to - *turned).squaredNorm());
   }
   if (moved.empty()) return std::nullopt;
   const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2);

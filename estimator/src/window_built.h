@@ -14,6 +14,7 @@ struct Window::Built {
   int extrinsics = -1;
   int td = -1;
   int readout = -1;
+  int intrinsics = -1;           // where they are estimated
   std::size_t visual_terms = 0;  // they come first
 
   int add(double* values, int size, int dof, const ceres::Manifold* manifold);

@@ -32,16 +32,18 @@ void Window::add_calibration(Built& built) {
   built.problem.blocks.back().constant = !free.td;
   built.readout = built.add(&readout_s_, 1, 1, nullptr);
   built.problem.blocks.back().constant = !free.readout;
+  if (free.intrinsics) built.intrinsics = built.add(intrinsics_.data(), kIntrinsicsSize, kIntrinsicsSize, nullptr);
 }
 
-std::array<int, 6> Window::point_blocks(const WindowPoint& point, const WindowObservation& o, int landmark,
-                                        const Built& built, int& count) const {
-  std::array<int, 6> blocks = {};
+std::array<int, kMostBlocks> Window::point_blocks(const WindowPoint& point, const WindowObservation& o, int landmark,
+                                                  const Built& built, int& count) const {
+  std::array<int, kMostBlocks> blocks = {};
   std::size_t n = 0;
   blocks[n++] = built.of(point.anchor->x.data());
   if (!is_free_point() || o.frame != point.anchor) blocks[n++] = built.of(o.frame->x.data());
   for (const int calibration : {built.extrinsics, built.td, built.readout}) blocks[n++] = calibration;
   blocks[n++] = landmark;
+  if (built.intrinsics >= 0) blocks[n++] = built.intrinsics;
   count = static_cast<int>(n);
   return blocks;
 }

@@ -15,6 +15,7 @@ namespace {
 using core::kStateDof;
 using Variable = InformationChain::Variable;
 using StateVector = Eigen::Matrix<double, kStateDof, 1>;
+constexpr int kFirstIntrinsics = 8;  // of the calibration
 
 // Units in which the information of every block is of the same order, so that sums and differences keep their digits.
 StateVector state_units() {
@@ -25,7 +26,7 @@ StateVector state_units() {
 }
 Eigen::Matrix<double, kCalibrationDof, 1> calibration_units() {
   Eigen::Matrix<double, kCalibrationDof, 1> u;
-  u << Eigen::Vector3d::Constant(1e-3), Eigen::Vector3d::Constant(1e-3), 1e-4, 1e-4;
+  u << Eigen::Vector3d::Constant(1e-3), Eigen::Vector3d::Constant(1e-3), 1e-4, 1e-4, core::Intrinsics::Ones();
   return u;
 }
 
@@ -33,12 +34,13 @@ class Builder {
  public:
   Builder(const core::MeasurementLog& log, const sim::GroundTruth& truth, const BoundOptions& options)
       : log_(log), truth_(truth), options_(options), imu_(noise_free_imu(log, truth)) {
-    const std::array<bool, kCalibrationDof> is_free = {options.extrinsics, options.extrinsics, options.extrinsics,
-                                                       options.extrinsics, options.extrinsics, options.extrinsics,
-                                                       options.td,         options.readout};
-    for (int i = 0; i < kCalibrationDof; ++i) {
-      if (is_free[static_cast<std::size_t>(i)]) free_.push_back(i);
-    }
+    const auto free = [&](bool is_free, int first, int count) {
+      for (int i = 0; is_free && i < count; ++i) free_.push_back(first + i);
+    };
+    free(options.extrinsics, 0, 6);
+    free(options.td, 6, 1);
+    free(options.readout, 7, 1);
+    free(options.intrinsics, kFirstIntrinsics, estimator::kIntrinsicsSize);
     place_states();
     visual_ = linearise_visual(log_, truth_, options_, {imu_, samples_, true_states_});
     landmarks_.assign(visual_.tracks.size(), -1);
@@ -89,7 +91,7 @@ class Builder {
     const core::CalibrationSigmas& s = log_.prior.calibration_sigma;
     Eigen::Matrix<double, kCalibrationDof, 1> sigmas;
     sigmas << Eigen::Vector3d::Constant(s.extrinsic_position_m), Eigen::Vector3d::Constant(s.extrinsic_rotation_rad),
-        s.td_s, s.readout_s;
+        s.td_s, s.readout_s, s.focal_px, s.focal_px, s.principal_point_px, s.principal_point_px;
     chain_.observe({calibration_}, calibration_units().cwiseQuotient(sigmas)(free_).asDiagonal());
   }
 
@@ -156,6 +158,7 @@ class Builder {
   };
   Layout layout() const {
     Layout l{.rows = free_, .units = Eigen::VectorXd(static_cast<Eigen::Index>(free_.size()) + kStateDof)};
+    for (int& row : l.rows) row += row < kFirstIntrinsics ? 0 : core::kCovIntrinsics - kFirstIntrinsics;
     for (int i = 0; i < kStateDof; ++i) l.rows.push_back(core::kCovLastState + i);
     for (std::size_t i = 0; i < free_.size(); ++i) {
       l.units[static_cast<Eigen::Index>(i)] = calibration_units()[free_[i]];
@@ -214,7 +217,7 @@ class Builder {
   void add_kappa2() {
     const auto kappa2 = [&](const VisualGaps& gaps, double sigma_px) {
       if (gaps.observations == 0) return 0.0;
-      const double pixels = log_.imu_noise.gyro_noise_density * log_.camera.fx_px / sigma_px;
+      const double pixels = log_.imu_noise.gyro_noise_density * truth_.calibration.camera(log_.camera).fx_px / sigma_px;
       const double mean_gap_s = gaps.sum_s / gaps.observations;
       return pixels * pixels * mean_gap_s *
              (static_cast<double>(gaps.observations) / static_cast<double>(options_.frames.size()));

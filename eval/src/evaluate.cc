@@ -43,11 +43,13 @@ std::vector<core::State> true_states(const core::EstimateLog& estimate, const si
 CovarianceTangent unaligned_error(const core::EstimateLog& estimate, const core::RigCalibration& true_calibration,
                                   const core::State& true_last) {
   const core::RigCalibration& calibration = estimate.calibration;
+  core::Intrinsics intrinsics = core::Intrinsics::Zero();
+  if (calibration.intrinsics) intrinsics = *calibration.intrinsics - true_calibration.intrinsics.value();
   CovarianceTangent e;
   e << calibration.T_B_C.p - true_calibration.T_B_C.p,
       core::log_so3(true_calibration.T_B_C.q.conjugate() * calibration.T_B_C.q),
       calibration.td_s - true_calibration.td_s, calibration.readout_s - true_calibration.readout_s,
-      core::minus(estimate.states.back().state, true_last);
+      core::minus(estimate.states.back().state, true_last), intrinsics;
   return e;
 }
 
@@ -58,7 +60,7 @@ bool is_finite(const core::EstimateLog& estimate) {
   }
   const core::RigCalibration& c = estimate.calibration;
   return c.T_B_C.p.allFinite() && c.T_B_C.q.coeffs().allFinite() && std::isfinite(c.td_s) &&
-         std::isfinite(c.readout_s) && estimate.covariance.allFinite();
+         std::isfinite(c.readout_s) && (!c.intrinsics || c.intrinsics->allFinite()) && estimate.covariance.allFinite();
 }
 
 // Indices [first, first + count) of the posterior covariance.
@@ -101,6 +103,7 @@ class BlockMetrics {
     metrics_.push_back(std::move(metric));
   }
 
+  double norm(int offset, int dof) const { return e_.segment(offset, dof).norm(); }
   double norm3(int offset) const { return e_.segment<3>(offset).norm(); }
   bool is_free(int offset, int dof) const { return !P_.block(offset, offset, dof, dof).isZero(0.0); }
   std::vector<Metric> take() { return std::move(metrics_); }
@@ -130,6 +133,8 @@ std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const Covar
   if (extrinsics) calibration = indices(core::kCovExtrinsicPosition, 6);
   if (estimate.td_estimated) calibration.push_back(core::kCovTd);
   if (estimate.readout_estimated) calibration.push_back(core::kCovReadout);
+  const bool intrinsics = estimate.calibration.intrinsics.has_value();
+  if (intrinsics) calibration = joined(std::move(calibration), indices(core::kCovIntrinsics, 4));
   std::vector<int> last;
   for (const auto& [offset, dof] : {std::pair(kPose, 6), std::pair(kVelocity, 3), std::pair(kBias, 6)}) {
     if (m.is_free(offset, dof)) last = joined(std::move(last), indices(offset, dof));
@@ -144,6 +149,11 @@ std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const Covar
   m.add("extrinsic_rotation_deg", m.norm3(core::kCovExtrinsicRotation) * core::kDegreesPerRadian,
         indices(core::kCovExtrinsicRotation, 3), extrinsics);
   m.add("extrinsic", extrinsic_m, indices(core::kCovExtrinsicPosition, 6), extrinsics);
+  if (intrinsics) {
+    m.add("focal_error_px", m.norm(core::kCovIntrinsics, 2), indices(core::kCovIntrinsics, 2), true);
+    m.add("principal_point_error_px", m.norm(core::kCovIntrinsics + 2, 2), indices(core::kCovIntrinsics + 2, 2), true);
+    m.add("intrinsics", m.norm(core::kCovIntrinsics, 4), indices(core::kCovIntrinsics, 4), true);
+  }
   m.add("calibration", extrinsic_m, calibration, true);
   m.add("final_pose", position_m, indices(kPose, 6), m.is_free(kPose, 6));
   m.add("final_position", position_m, indices(kPose, 3), m.is_free(kPose, 6));

@@ -14,12 +14,15 @@ struct Block {
 };
 
 constexpr int kState = core::kCovLastState;
-constexpr std::array<Block, 11> kBlocks = {{
+constexpr std::array<Block, 14> kBlocks = {{
     {"td_error_s", core::kCovTd, 1, 1.0},
     {"readout_error_s", core::kCovReadout, 1, 1.0},
     {"extrinsic_position_m", core::kCovExtrinsicPosition, 3, 1.0},
     {"extrinsic_rotation_deg", core::kCovExtrinsicRotation, 3, core::kDegreesPerRadian},
     {"extrinsic", core::kCovExtrinsicPosition, 3, 1.0},
+    {"focal_error_px", core::kCovIntrinsics, 2, 1.0},
+    {"principal_point_error_px", core::kCovIntrinsics + 2, 2, 1.0},
+    {"intrinsics", core::kCovIntrinsics, 4, 1.0},
     {"final_pose", kState + core::kPosition, 3, 1.0},
     {"final_position", kState + core::kPosition, 3, 1.0},
     {"final_orientation_deg", kState + core::kOrientation, 3, core::kDegreesPerRadian},

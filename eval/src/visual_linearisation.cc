@@ -140,7 +140,7 @@ class TrueLine {
     VisualObservation& o = seen.observation;
     o.state = on_tangent<kStateSize, core::kStateDof>(J_state, estimator::StateManifold(), x.data());
     o.calibration << on_tangent<kPoseSize, 6>(J_extrinsics, estimator::PoseManifold(), extrinsics_.data()), J_td,
-        J_readout;
+        J_readout, Eigen::Matrix<double, 2, estimator::kIntrinsicsSize>::Zero();  // held where there are lines
     o.landmark = on_tangent<kLineSize, kLineDof>(J_line, estimator::OrthonormalLineManifold(), line.data());
     const auto gap_s = [&](const Eigen::Vector2d& pixel) {
       const double phase = core::row_phase(pixel.y(), model_.camera.height_px);
@@ -183,7 +183,7 @@ class Lineariser {
   const core::Frame& frame(std::size_t k) const { return log_.frames[options_.frames[k]]; }
 
   void add_points() {
-    const estimator::CameraModel model{log_.camera, log_.pixel_sigma_px, log_.gravity_m_s2};
+    const estimator::CameraModel model{truth_.calibration.camera(log_.camera), log_.pixel_sigma_px, log_.gravity_m_s2};
     Tracks<3> tracks(result_);
     for (std::size_t k = 0; k < timings_.size(); ++k) {
       for (const core::PointObservation& point : frame(k).points) {
@@ -195,7 +195,7 @@ class Lineariser {
                                                          P_W, point.pixel.y(), &J);
         if (!seen) continue;
         VisualObservation observation{.state = J.state, .calibration = {}, .landmark = J.point};
-        observation.calibration << J.extrinsics, J.td, J.readout;
+        observation.calibration << J.extrinsics, J.td, J.readout, J.intrinsics;
         tracks.add(k, point.track_id, std::move(observation));
         result_.point_gaps.sum_s += std::abs(seen->tau_s);
         ++result_.point_gaps.observations;
@@ -216,13 +216,14 @@ class Lineariser {
   }
 
   void add_lines() {
-    const estimator::CameraModel model{log_.camera, log_.line_sigma_px, log_.gravity_m_s2};
+    const estimator::CameraModel model{truth_.calibration.camera(log_.camera), log_.line_sigma_px, log_.gravity_m_s2};
     const TrueLine view(model, truth_.calibration);
     Tracks<kLineDof> tracks(result_);
     std::map<std::int64_t, LineAtTruth> lines;
     for (std::size_t k = 0; k < timings_.size(); ++k) {
       for (const core::LineObservation& o : frame(k).lines) {
         if (!(log_.line_sigma_px > 0.0)) throw std::domain_error("the bound of lines needs line_sigma_px > 0");
+        if (options_.intrinsics) throw std::domain_error("the bound of lines needs known intrinsics");
         const auto segment = truth_.track_segment.find(o.track_id);
         if (segment == truth_.track_segment.end()) continue;
         const auto index = static_cast<std::size_t>(segment->second);

@@ -17,7 +17,7 @@
 
 namespace plumbline::eval {
 
-inline constexpr int kCalibrationDof = 8;  // the first rows of core::PosteriorCovariance
+inline constexpr int kCalibrationDof = 12;  // T_B_C, td, readout, intrinsics
 
 struct VisualObservation {
   int track = 0;

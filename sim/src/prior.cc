@@ -1,5 +1,7 @@
 #include "sim/prior.h"
 
+#include <array>
+
 namespace plumbline::sim {
 namespace {
 
@@ -23,6 +25,12 @@ Draw draw(const GroundTruth& truth, const core::StateSigmas& sigma, const core::
           .normalized();
   calibration.td_s += calibration_sigma.td_s * stream.normal(7);
   calibration.readout_s += calibration_sigma.readout_s * stream.normal(8);
+  if (calibration.intrinsics) {
+    const std::array<double, 4> n = stream.normals(9);
+    *calibration.intrinsics +=
+        core::Intrinsics(calibration_sigma.focal_px * n[0], calibration_sigma.focal_px * n[1],
+                         calibration_sigma.principal_point_px * n[2], calibration_sigma.principal_point_px * n[3]);
+  }
   return {core::plus(truth.states.front().state, noise.cwiseProduct(sigma.per_axis())), calibration};
 }
 

@@ -20,6 +20,9 @@ void visit(core::ConfigVisitor& v, PriorConfig& c) {
   v.value("extrinsic_position_sigma_m", c.extrinsic_position_sigma_m, up_to(core::kMostM), "of p_B_C, each axis");
   v.value("extrinsic_rotation_sigma_rad", c.extrinsic_rotation_sigma_rad, up_to(core::kMostAngleRad),
           "of R_B_C, each axis");
+  v.value("focal_sigma_px", c.focal_sigma_px, up_to(core::kMostPixels),
+          "of fx and fy, at most a tenth of them; the camera that the estimator is told is the mean");
+  v.value("principal_point_sigma_px", c.principal_point_sigma_px, up_to(core::kMostPixels), "of cx and cy");
   v.value("position_sigma_m", c.position_sigma_m, sigma_up_to(core::kMostM),
           "of the first state, each axis; fixes the gauge");
   v.value("orientation_sigma_rad", c.orientation_sigma_rad, sigma_up_to(core::kMostAngleRad),
@@ -43,7 +46,9 @@ core::CalibrationSigmas PriorConfig::calibration_sigmas() const {
   return {.td_s = td_sigma_s,
           .readout_s = readout_sigma_s,
           .extrinsic_position_m = extrinsic_position_sigma_m,
-          .extrinsic_rotation_rad = extrinsic_rotation_sigma_rad};
+          .extrinsic_rotation_rad = extrinsic_rotation_sigma_rad,
+          .focal_px = focal_sigma_px,
+          .principal_point_px = principal_point_sigma_px};
 }
 
 }  // namespace plumbline::sim

@@ -1,5 +1,6 @@
 #include "sim/scenario.h"
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 
@@ -13,7 +14,9 @@ core::RigCalibration ScenarioConfig::calibration() const {
   const double shown_s = camera.exposure_stamp == ExposureStamp::kStart ? 0.5 * camera.exposure_s : 0.0;
   return {.T_B_C = {q.normalized(), camera.extrinsic_position_m},
           .td_s = core::td_middle_from(camera.td_s, camera.readout_s, camera.td_reference_row) + shown_s,
-          .readout_s = camera.readout_s};
+          .readout_s = camera.readout_s,
+          .intrinsics =
+              prior.calibration_sigmas().has_intrinsics() ? std::optional(camera.model.intrinsics()) : std::nullopt};
 }
 
 void visit(core::ConfigVisitor& v, ScenarioConfig& c) {
@@ -39,6 +42,9 @@ std::optional<core::RuleViolation> validate(const ScenarioConfig& c) {
   if (auto violation = in("world", validate(c.world))) return violation;
   if (auto violation = in("points", validate(c.points))) return violation;
   if (auto violation = in("lines", validate(c.lines))) return violation;
+  if (c.prior.focal_sigma_px > 0.1 * std::min(c.camera.model.fx_px, c.camera.model.fy_px)) {
+    return core::RuleViolation{"prior.focal_sigma_px", "must be at most a tenth of the focal lengths"};
+  }
   if (c.lines.per_frame > 0 && !c.world.has_lines()) {
     return core::RuleViolation{"lines.per_frame", "must be 0 in a world without segments (world.lines)"};
   }

@@ -57,10 +57,12 @@ Simulation simulate(const ScenarioConfig& config, core::TrialId id) {
   s.truth.track_segment = std::move(camera.track_segment);
   s.truth.line_ends = std::move(camera.line_ends);
 
+  core::InitialPrior prior = make_prior(s.truth, config, id);
+  const core::PinholeCamera told_camera = prior.calibration.camera(config.camera.model);
   s.measurements = {.imu = std::move(imu.samples),
                     .frames = std::move(camera.frames),
-                    .prior = make_prior(s.truth, config, id),
-                    .camera = config.camera.model,
+                    .prior = std::move(prior),
+                    .camera = told_camera,
                     .imu_noise = config.imu.noise,
                     .pixel_sigma_px = config.camera.pixel_sigma_px,
                     .line_sigma_px = config.lines.per_frame > 0 ? config.lines.sigma_px : 0.0,

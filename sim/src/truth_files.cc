@@ -100,7 +100,10 @@ void write_truth(const std::filesystem::path& folder, const GroundTruth& truth) 
 
 GroundTruth read_truth(const std::filesystem::path& folder) {
   GroundTruth truth;
-  core::read_config(core::load_config_file(folder / kCalibration), "", truth.calibration);
+  const core::ConfigTree calibration = core::load_config_file(folder / kCalibration);
+  if (core::find_value(calibration, "intrinsics_px") != nullptr)
+    truth.calibration.intrinsics = core::Intrinsics::Zero();
+  core::read_config(calibration, "", truth.calibration);
 
   core::CsvReader states(folder / kStates, 17);
   while (states.next()) {

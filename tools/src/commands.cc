@@ -99,10 +99,18 @@ int estimate(const EstimateOptions& options) {
   fmt::print("{}{}{}, {} iterations, cost per degree of freedom {:.4f}\n",
              core::kSolveStatusNames[static_cast<std::size_t>(estimate.status)], estimate.reason.empty() ? "" : ": ",
              estimate.reason, estimate.summary.iterations, estimate.summary.cost_per_dof());
-  fmt::print("td {:.6f} ms (sigma {:.6f}), readout {:.6f} ms (sigma {:.6f}), middle row\nestimate: {}\n",
-             1e3 * estimate.calibration.td_s, 1e3 * std::sqrt(estimate.covariance(core::kCovTd, core::kCovTd)),
-             1e3 * estimate.calibration.readout_s,
-             1e3 * std::sqrt(estimate.covariance(core::kCovReadout, core::kCovReadout)), options.out.generic_string());
+  const auto sigma = [&](int i) { return std::sqrt(estimate.covariance(i, i)); };
+  fmt::print("td {:.6f} ms (sigma {:.6f}), readout {:.6f} ms (sigma {:.6f}), middle row\n",
+             1e3 * estimate.calibration.td_s, 1e3 * sigma(core::kCovTd), 1e3 * estimate.calibration.readout_s,
+             1e3 * sigma(core::kCovReadout));
+  if (const auto& K = estimate.calibration.intrinsics) {
+    fmt::print(
+        "fx {:.4f} px (sigma {:.4f}), fy {:.4f} px (sigma {:.4f}), cx {:.4f} px (sigma {:.4f}), cy {:.4f} px "
+        "(sigma {:.4f})\n",
+        (*K)[0], sigma(core::kCovIntrinsics), (*K)[1], sigma(core::kCovIntrinsics + 1), (*K)[2],
+        sigma(core::kCovIntrinsics + 2), (*K)[3], sigma(core::kCovIntrinsics + 3));
+  }
+  fmt::print("estimate: {}\n", options.out.generic_string());
   return estimate.status == core::SolveStatus::kConverged ? kExitOk : kExitWorse;
 }
 

@@ -30,8 +30,10 @@ void write_estimate(const std::filesystem::path& folder, const core::EstimateLog
   core::write_tum(folder / "estimate.tum", poses);
   const auto sigma = [&](int i) { return std::sqrt(estimate.covariance(i, i)); };
   ordered_json covariance = ordered_json::array();
-  for (int r = 0; r < core::kCovDim; ++r) {
-    for (int c = 0; c < core::kCovDim; ++c) covariance.push_back(estimate.covariance(r, c));
+  const bool intrinsics = estimate.calibration.intrinsics.has_value();
+  const int dim = intrinsics ? core::kCovDim : core::kCovIntrinsics;
+  for (int r = 0; r < dim; ++r) {
+    for (int c = 0; c < dim; ++c) covariance.push_back(estimate.covariance(r, c));
   }
   ordered_json meta = {{"schema", "plumbline-estimate/1"},
                        {"version", version()},
@@ -45,7 +47,9 @@ void write_estimate(const std::filesystem::path& folder, const core::EstimateLog
                        {"iterations", estimate.summary.iterations},
                        {"final_cost", estimate.summary.final_cost},
                        {"cost_per_dof", estimate.summary.cost_per_dof()},
-                       {"covariance_order", "p_B_C, theta_B_C, td, readout, last state (p, theta, v, b_g, b_a)"},
+                       {"covariance_order", std::string("p_B_C, theta_B_C, td, readout, last state (p, theta, v, b_g, "
+                                                        "b_a)") +
+                                                (intrinsics ? ", fx, fy, cx, cy" : "")},
                        {"covariance", covariance}};
   core::write_file_atomically(folder / "meta.yaml", core::to_yaml(meta));
 }

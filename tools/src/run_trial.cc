@@ -35,17 +35,16 @@ class ThreadClock {
 
 // NEES and bound speak of a prior whose mean was drawn with the covariance that the estimator is given. Exact means
 // leave no room for them at all, and a fixed mean of td or readout none for its own and for what holds it.
-// A robust loss bends the likelihood that a covariance is of; the bound is of the data and stays.
 void withhold_claims(const Experiment& experiment, std::vector<eval::Metric>& metrics) {
   const sim::PriorConfig& prior = experiment.scenario.prior;
-  const bool robust = experiment.estimator.loss != estimator::RobustLoss::kNone;
+  const bool no_claim = !reason_to_claim_nothing(experiment).empty();
   const bool exact = prior.means == sim::PriorMeans::kTruth;
   for (eval::Metric& metric : metrics) {
     const bool of_both = metric.name == "calibration" || metric.name == "joint";
     const bool of_td = of_both || metric.name.starts_with("td_");
     const bool of_readout = of_both || metric.name.starts_with("readout_") || metric.name == "td_first_error_s";
     const bool no_room = exact || (prior.td_mean_s && of_td) || (prior.readout_mean_s && of_readout);
-    if (robust || no_room) {
+    if (no_claim || no_room) {
       metric.nees.reset();
       metric.nees_dof = 0;
     }
@@ -63,6 +62,7 @@ void add_bound(const Experiment& experiment, const core::MeasurementLog& measure
        .td = free.td,
        .readout = free.readout,
        .extrinsics = free.extrinsics,
+       .intrinsics = free.intrinsics,
        .points = estimator::uses_points(experiment.estimator.use),
        .lines = estimator::uses_lines(experiment.estimator.use),
        .alignment = experiment.metrics.alignment,
@@ -73,6 +73,16 @@ void add_bound(const Experiment& experiment, const core::MeasurementLog& measure
 }
 
 }  // namespace
+
+std::string reason_to_claim_nothing(const Experiment& experiment) {
+  if (experiment.estimator.loss != estimator::RobustLoss::kNone) return "the estimator has a robust loss";
+  const sim::PriorConfig& prior = experiment.scenario.prior;
+  if (prior.means == sim::PriorMeans::kDrawn && prior.calibration_sigmas().has_intrinsics() &&
+      !experiment.estimator.estimate.intrinsics) {
+    return "the camera is held, and not known exactly";
+  }
+  return {};
+}
 
 eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, TrialTimings* timings) {
   if (omp_set_max_active_levels != nullptr) omp_set_max_active_levels(0);

@@ -10,6 +10,7 @@
 #include "eval/summary.h"
 #include "eval/summary_table.h"
 #include "tools/report.h"
+#include "tools/run_trial.h"
 #include "tools/sweep.h"
 #include "tools/version.h"
 
@@ -42,8 +43,7 @@ std::vector<eval::CellSummary> summarise_cells(const Plan& plan, const fs::path&
   std::vector<eval::Row> rows;
   const auto close_cell = [&] {
     const Cell& cell = plan.cells[summaries.size()];
-    const bool robust = cell.experiment.estimator.loss != estimator::RobustLoss::kNone;
-    summaries.push_back(eval::summarise(rows, cell.axes, robust ? "the estimator has a robust loss" : ""));
+    summaries.push_back(eval::summarise(rows, cell.axes, reason_to_claim_nothing(cell.experiment)));
     rows.clear();
   };
   eval::for_each_row(out / "results.jsonl", [&](const eval::Row& row) {

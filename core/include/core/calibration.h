@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 
 #include "core/camera.h"
@@ -29,6 +30,10 @@ struct RigCalibration {
   Pose T_B_C;
   double td_s = 0.0;       // middle row
   double readout_s = 0.0;  // first row to last; 0 for a global shutter, and an estimate may be negative
+  // Where the camera's are not exactly known; else those of the camera model hold.
+  std::optional<Intrinsics> intrinsics = std::nullopt;
+
+  PinholeCamera camera(const PinholeCamera& model) const { return intrinsics ? model.with(*intrinsics) : model; }
 };
 
 // Continuous-time densities: a sample at interval dt has white noise sigma/sqrt(dt), a bias step sigma_b*sqrt(dt).

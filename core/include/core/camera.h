@@ -11,6 +11,8 @@
 
 namespace plumbline::core {
 
+using Intrinsics = Eigen::Vector4d;  // (fx, fy, cx, cy) [px]
+
 struct PinholeCamera {
   int width_px = 640;
   int height_px = 480;
@@ -19,6 +21,12 @@ struct PinholeCamera {
   double cx_px = 319.5;
   double cy_px = 239.5;
   Distortion distortion = {};
+
+  Intrinsics intrinsics() const { return {fx_px, fy_px, cx_px, cy_px}; }
+  PinholeCamera with(const Intrinsics& K) const;
+
+  // d(u, v)/d(fx, fy, cx, cy) of the ray that the pixel sees.
+  Eigen::Matrix<double, 2, 4> intrinsics_jacobian(const Eigen::Vector2d& pixel) const;
 
   // Pixel of the point P_C in the camera frame (any positive scale of it will do, since only the direction counts);
   // nothing for a point that is not in front of the camera or beyond the fold of its lens. J, if given, is

@@ -31,14 +31,15 @@ struct StampedState {
 };
 
 // The joint posterior covariance of calibration and last state, in the perturbations of docs/conventions.md:
-//   [ p_B_C | theta_B_C | td (middle row) | readout | last state (15) ]
+//   [ p_B_C | theta_B_C | td (middle row) | readout | last state (15) | fx, fy, cx, cy ]
 // Rows and columns of a parameter that was held fixed are zero.
 inline constexpr int kCovExtrinsicPosition = 0;
 inline constexpr int kCovExtrinsicRotation = 3;
 inline constexpr int kCovTd = 6;
 inline constexpr int kCovReadout = 7;
 inline constexpr int kCovLastState = 8;
-inline constexpr int kCovDim = kCovLastState + kStateDof;
+inline constexpr int kCovIntrinsics = kCovLastState + kStateDof;
+inline constexpr int kCovDim = kCovIntrinsics + 4;
 using PosteriorCovariance = Eigen::Matrix<double, kCovDim, kCovDim>;
 
 // The online history of td: what the estimator knew at an instant.
@@ -91,7 +92,7 @@ struct EstimateLog {
   SolveStatus status = SolveStatus::kFailedInitialisation;
   std::string reason;  // one line where the status is not kConverged
   std::vector<StampedState> states;
-  RigCalibration calibration;
+  RigCalibration calibration;  // with intrinsics where they were estimated
   bool td_estimated = false;
   bool readout_estimated = false;
   bool extrinsics_estimated = false;

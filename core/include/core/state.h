@@ -71,6 +71,10 @@ struct CalibrationSigmas {
   double readout_s = 0.0;
   double extrinsic_position_m = 0.0;
   double extrinsic_rotation_rad = 0.0;
+  double focal_px = 0.0;  // fx and fy, each
+  double principal_point_px = 0.0;
+
+  bool has_intrinsics() const { return focal_px > 0.0 || principal_point_px > 0.0; }
 };
 
 }  // namespace plumbline::core

@@ -46,4 +46,15 @@ bool ScalarPriorFactor::Evaluate(double const* const* parameters, double* residu
   return true;
 }
 
+bool IntrinsicsPriorFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
+  const Eigen::Map<const core::Intrinsics> K(parameters[0]);
+  Eigen::Map<core::Intrinsics> r(residuals);
+  r = (mean_ - K).cwiseQuotient(sigma_);
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    Eigen::Map<Eigen::Matrix4d> J(jacobians[0]);
+    J = Eigen::Matrix4d((-sigma_.cwiseInverse()).asDiagonal());
+  }
+  return true;
+}
+
 }  // namespace plumbline::estimator

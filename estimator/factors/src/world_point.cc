@@ -25,6 +25,7 @@ std::optional<WorldPointView> observe_world_point(const CameraModel& model, cons
     jacobians->extrinsics << -J_X, times_skew(J_q, chain.q);
     jacobians->td = J_q * seen.q_dot;
     jacobians->readout = seen.phase * jacobians->td;
+    jacobians->intrinsics = intrinsics_jacobian(model, *pixel, calibration.readout_s, jacobians->td);
     jacobians->point = J_W;
   }
   return WorldPointView{*pixel, tau_s};

@@ -42,6 +42,7 @@ struct EstimateWhat {
   bool td = true;
   bool readout = true;
   bool extrinsics = true;
+  bool intrinsics = false;
 };
 
 // When a line is estimated at all (estimator/line_triangulation.h) and when it is given up.

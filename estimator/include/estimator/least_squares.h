@@ -29,9 +29,11 @@ struct ParameterBlock {
   double share_of_information = 0.0;
 };
 
+inline constexpr int kMostBlocks = 7;  // of a term
+
 struct ResidualTerm {
   const ceres::CostFunction* factor = nullptr;
-  std::array<int, 6> blocks = {};
+  std::array<int, kMostBlocks> blocks = {};
   int count = 0;
   const ceres::LossFunction* loss = nullptr;
 };

@@ -142,6 +142,7 @@ class Window {
   const WindowFrame& newest() const { return *frames_.back(); }
   const WindowFrame& oldest() const { return *frames_.front(); }
   core::RigCalibration calibration() const;
+  core::PinholeCamera camera() const { return log_.camera.with(intrinsics_); }
   const MarginalPrior* prior() const { return prior_.get(); }
   int observations_of_newest() const;
 
@@ -165,8 +166,8 @@ class Window {
   void add_line_terms(WindowLine& line, Built& built);
   void add_inertial_term(std::size_t i, Built& built);
   Built build_all();
-  std::array<int, 6> point_blocks(const WindowPoint& point, const WindowObservation& observation, int landmark,
-                                  const Built& built, int& count) const;
+  std::array<int, kMostBlocks> point_blocks(const WindowPoint& point, const WindowObservation& observation,
+                                            int landmark, const Built& built, int& count) const;
   void remove_frame(std::size_t i);
 
   const core::MeasurementLog& log_;
@@ -180,6 +181,7 @@ class Window {
   PoseBlock extrinsics_;
   double td_s_;
   double readout_s_;
+  core::Intrinsics intrinsics_;
   double timing_td_s_;
   // Before anything has left, then `prior_`.
   struct InitialTerm {

@@ -51,6 +51,7 @@ struct BoundOptions {
   bool td = true;                   // what is free
   bool readout = true;
   bool extrinsics = true;
+  bool intrinsics = false;
   bool points = true;  // what is observed
   bool lines = true;
   Alignment alignment = Alignment::kPosyaw;  // by all poses
@@ -63,7 +64,7 @@ struct BoundOptions {
 std::vector<core::ImuSample> noise_free_imu(const core::MeasurementLog& log, const sim::GroundTruth& truth);
 
 // Needs positive noise densities and pixel noise of what is observed. Throws std::domain_error where the information is
-// singular.
+// singular, and where the intrinsics are free and there are lines.
 CramerRaoBound cramer_rao_bound(const core::MeasurementLog& log, const sim::GroundTruth& truth,
                                 const BoundOptions& options);
 

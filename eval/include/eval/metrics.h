@@ -9,7 +9,11 @@
 //   extrinsic_position_m  |p_est - p_true| of T_B_C                          3 dof, where estimated
 //   extrinsic_rotation_deg  |Log(R_true^T R_est)| of T_B_C                   3 dof, where estimated
 //   extrinsic             m, as extrinsic_position_m                         6 dof, [position | orientation] jointly
-//   calibration           m, as extrinsic_position_m                         all of T_B_C, td, readout that is free
+//   focal_error_px        |(fx, fy)_est - (fx, fy)_true|                     2 dof; these three where estimated only
+//   principal_point_error_px  likewise of (cx, cy)                           2 dof
+//   intrinsics            px, likewise of (fx, fy, cx, cy)                   4 dof
+//   calibration           m, as extrinsic_position_m                         all of T_B_C, td, readout and intrinsics
+//                                                                            that is free
 //   final_pose            m, |p_est - p_true| of the last state, unaligned   6 dof, [position | orientation] jointly
 //   final_position        m, the same                                        3 dof
 //   final_orientation_deg  |Log(R_true^T R_est)| of the last state           3 dof
@@ -63,7 +67,7 @@ inline constexpr std::string_view kLineAngle = "line_angle_deg";
 inline constexpr std::string_view kLineDistance = "line_distance_m";
 inline constexpr std::string_view kLineShare = "line_share";
 
-inline constexpr std::array<MetricInfo, 25> kMetrics = {{
+inline constexpr std::array<MetricInfo, 28> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
@@ -72,6 +76,9 @@ inline constexpr std::array<MetricInfo, 25> kMetrics = {{
     {"extrinsic_position_m", "extrinsic position [mm]", 1e3},
     {"extrinsic_rotation_deg", "extrinsic rotation [deg]", 1.0},
     {"extrinsic", "extrinsic, joint", 1e3, false, false},
+    {"focal_error_px", "focal lengths [px]"},
+    {"principal_point_error_px", "principal point [px]"},
+    {"intrinsics", "intrinsics, joint", 1.0, false, false},
     {"calibration", "calibration, joint", 1e3, false, false},
     {"final_pose", "final pose [mm]", 1e3},
     {"final_position", "final position", 1e3, false, false},

@@ -24,6 +24,8 @@ struct PriorConfig {
   double readout_sigma_s = 0.005;
   double extrinsic_position_sigma_m = 0.02;
   double extrinsic_rotation_sigma_rad = 0.02;
+  double focal_sigma_px = 0.0;  // 0 both: the camera is known
+  double principal_point_sigma_px = 0.0;
   double position_sigma_m = 0.01;
   double orientation_sigma_rad = 0.01;
   double velocity_sigma_m_s = 0.05;

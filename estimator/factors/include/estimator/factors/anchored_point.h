@@ -8,10 +8,14 @@
 // change at all where the whole world is moved or turned. Every observation, the anchor's own frame's too, is a
 // residual.
 //   `propagated`         r = h(q) - h(observed),      body j when the predicted row is exposed (rolling_view.h)
+//                        with the camera's K = (fx, fy, cx, cy) estimated, pixels only: K moves the picture and,
+//                        through the row v, the time; at a fixed time dv = (dv/dK) dK, so that
+//                          dr/dK = (d(u, v)/dK)/sigma + (dr/dtd) (readout/rows) dv/dK
 //   `feature_velocity`   r = h(q) - h(p_j(td, readout)),   body j the state itself (feature_velocity.h)
 #pragma once
 
 #include <optional>
+#include <type_traits>
 
 #include <ceres/sized_cost_function.h>
 
@@ -23,9 +27,20 @@ namespace plumbline::estimator {
 // What the observer's half of the chain does with a point: the residual, and its derivatives.
 struct Sighting;
 
+// Where a look is made from.
+struct Viewpoint {
+  const core::State& state;
+  const RigidMotion& T_B_C;
+  double td_s = 0.0;
+  double readout_s = 0.0;
+  const double* intrinsics = nullptr;  // where the sight estimates them
+};
+
 // One frame's look at points; the two timing models.
 class PropagatedSight {
  public:
+  static constexpr bool kEstimatesCamera = false;
+
   PropagatedSight(const CameraModel& model, FrameTiming frame, const Eigen::Vector2d& observed_pixel)
       : camera_(model.camera),
         chart_(model.residual, model.camera, model.pixel_sigma_px, observed_pixel),
@@ -34,8 +49,7 @@ class PropagatedSight {
         measured_row_(observed_pixel.y()) {}
 
   // W and lambda of the chain are given; sets X and q. False where Evaluate must be.
-  bool see(const core::State& state, const RigidMotion& T_B_C, double td_s, double readout_s, PointChain& chain,
-           bool differentiate, Sighting& sighting) const;
+  bool see(const Viewpoint& from, PointChain& chain, bool differentiate, Sighting& sighting) const;
 
  private:
   core::PinholeCamera camera_;
@@ -45,21 +59,42 @@ class PropagatedSight {
   double measured_row_;
 };
 
+// `propagated` with a camera whose intrinsics are estimated; those of the model do not count.
+class FreeCameraSight {
+ public:
+  static constexpr bool kEstimatesCamera = true;
+
+  // Throws std::invalid_argument where the residual is not in pixels: any other is whitened by the camera.
+  FreeCameraSight(const CameraModel& model, FrameTiming frame, const Eigen::Vector2d& observed_pixel);
+
+  bool see(const Viewpoint& from, PointChain& chain, bool differentiate, Sighting& sighting) const;
+
+ private:
+  CameraModel model_;
+  FrameTiming frame_;
+  Eigen::Vector2d observed_pixel_;
+};
+
 class VelocitySight {
  public:
+  static constexpr bool kEstimatesCamera = false;
+
   VelocitySight(const RayChart& chart, const MovingBearing& observed) : chart_(chart), observed_(observed) {}
 
-  bool see(const core::State& state, const RigidMotion& T_B_C, double td_s, double readout_s, PointChain& chain,
-           bool differentiate, Sighting& sighting) const;
+  bool see(const Viewpoint& from, PointChain& chain, bool differentiate, Sighting& sighting) const;
 
  private:
   RayChart chart_;
   MovingBearing observed_;
 };
 
-// Blocks: anchor state, observer state, extrinsics, td, readout, landmark.
+template <class Sight, int... kSizes>
+using SightFactor = std::conditional_t<Sight::kEstimatesCamera, ceres::SizedCostFunction<2, kSizes..., kIntrinsicsSize>,
+                                       ceres::SizedCostFunction<2, kSizes...>>;
+
+// Blocks: anchor state, observer state, extrinsics, td, readout, landmark; and intrinsics where they are estimated.
 template <class Sight>
-class AnchoredPoint final : public ceres::SizedCostFunction<2, kStateSize, kStateSize, kPoseSize, 1, 1, kLandmarkSize> {
+class AnchoredPoint final : public SightFactor<Sight, kStateSize, kStateSize, kPoseSize, 1, 1, kLandmarkSize> {
  public:
   AnchoredPoint(Sight sight, const core::Pose& T_B_A) : sight_(std::move(sight)), T_B_A_(rigid_motion(T_B_A)) {}
 
@@ -70,9 +105,9 @@ class AnchoredPoint final : public ceres::SizedCostFunction<2, kStateSize, kStat
   RigidMotion T_B_A_;
 };
 
-// The same where the observer is the anchor. Blocks: state, extrinsics, td, readout, landmark.
+// The same where the observer is the anchor. Blocks: state, extrinsics, td, readout, landmark; intrinsics.
 template <class Sight>
-class OwnAnchoredPoint final : public ceres::SizedCostFunction<2, kStateSize, kPoseSize, 1, 1, kLandmarkSize> {
+class OwnAnchoredPoint final : public SightFactor<Sight, kStateSize, kPoseSize, 1, 1, kLandmarkSize> {
  public:
   OwnAnchoredPoint(Sight sight, const core::Pose& T_B_A) : sight_(std::move(sight)), T_B_A_(rigid_motion(T_B_A)) {}
 
@@ -84,8 +119,10 @@ class OwnAnchoredPoint final : public ceres::SizedCostFunction<2, kStateSize, kP
 };
 
 extern template class AnchoredPoint<PropagatedSight>;
+extern template class AnchoredPoint<FreeCameraSight>;
 extern template class AnchoredPoint<VelocitySight>;
 extern template class OwnAnchoredPoint<PropagatedSight>;
+extern template class OwnAnchoredPoint<FreeCameraSight>;
 extern template class OwnAnchoredPoint<VelocitySight>;
 
 // A landmark seen from another anchor.

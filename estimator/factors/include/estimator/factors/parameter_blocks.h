@@ -1,7 +1,7 @@
 // How states and calibration lie in the parameter blocks of Ceres.
 //   state      16 doubles  [ p_W_B | q_W_B (x y z w) | v_W | b_g | b_a ]     15 dof, tangent order of core/state.h
 //   extrinsics  7 doubles  [ p_B_C | q_B_C (x y z w) ]                       6 dof  [ p | theta ]
-//   td, readout  1 double each [s], landmark 3 doubles (x, y, lambda)
+//   td, readout  1 double each [s], landmark 3 doubles (x, y, lambda), intrinsics 4 doubles (fx, fy, cx, cy) [px]
 #pragma once
 
 #include <memory>
@@ -18,6 +18,7 @@ namespace plumbline::estimator {
 inline constexpr int kStateSize = 16;
 inline constexpr int kPoseSize = 7;
 inline constexpr int kLandmarkSize = 3;
+inline constexpr int kIntrinsicsSize = 4;
 
 using StateBlock = Eigen::Matrix<double, kStateSize, 1>;
 using PoseBlock = Eigen::Matrix<double, kPoseSize, 1>;

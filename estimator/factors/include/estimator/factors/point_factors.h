@@ -26,6 +26,14 @@ struct CameraModel {
   ResidualType residual = ResidualType::kPinhole;
 };
 
+// dr/d(fx, fy, cx, cy) of r = pixel/sigma_px where a point is seen; a row that moves moves the time. J_td = dr/dtd.
+inline Eigen::Matrix<double, 2, kIntrinsicsSize> intrinsics_jacobian(const CameraModel& model,
+                                                                     const Eigen::Vector2d& pixel, double readout_s,
+                                                                     const Eigen::Vector2d& J_td) {
+  const Eigen::Matrix<double, 2, kIntrinsicsSize> J = model.camera.intrinsics_jacobian(pixel);
+  return J / model.pixel_sigma_px + (readout_s / model.camera.height_px) * J_td * J.row(1);
+}
+
 // Blocks: anchor state, observer state, extrinsics, td, readout, landmark. False (Ceres rejects the step) where the
 // landmark is not in front of the observer, or a time leaves the range of the local motion.
 template <LandmarkType kLandmark>

@@ -45,4 +45,17 @@ class ScalarPriorFactor final : public ceres::SizedCostFunction<1, 1> {
   double sigma_;
 };
 
+// For (fx, fy, cx, cy).
+class IntrinsicsPriorFactor final : public ceres::SizedCostFunction<kIntrinsicsSize, kIntrinsicsSize> {
+ public:
+  IntrinsicsPriorFactor(const core::Intrinsics& mean, double focal_sigma_px, double principal_point_sigma_px)
+      : mean_(mean), sigma_(focal_sigma_px, focal_sigma_px, principal_point_sigma_px, principal_point_sigma_px) {}
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  core::Intrinsics mean_;
+  core::Intrinsics sigma_;
+};
+
 }  // namespace plumbline::estimator

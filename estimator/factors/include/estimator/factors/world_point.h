@@ -20,12 +20,14 @@ struct WorldPointView {
   double tau_s = 0.0;  // of the exposure, after the state
 };
 
-// d pixel / sigma_px with respect to the tangents of core/state.h and of the extrinsics, td, readout and P_W.
+// d pixel / sigma_px with respect to the tangents of core/state.h and of the extrinsics, td, readout, the camera's
+// (fx, fy, cx, cy) and P_W.
 struct WorldPointJacobians {
   Eigen::Matrix<double, 2, core::kStateDof> state;
   Eigen::Matrix<double, 2, 6> extrinsics;
   Eigen::Vector2d td;
   Eigen::Vector2d readout;
+  Eigen::Matrix<double, 2, kIntrinsicsSize> intrinsics;
   Eigen::Matrix<double, 2, 3> point;
 };
 
