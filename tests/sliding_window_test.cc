@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/random.h"
 #include "estimator/estimate.h"
 #include "nees_over_trials.h"
 #include "short_recording.h"
@@ -276,6 +277,36 @@ TEST(SlidingWindow, AWrongModelEndsAsANamedFailure) {
   const core::EstimateLog estimate = estimator::estimate(s.measurements, config);
   EXPECT_EQ(estimate.status, core::SolveStatus::kFalseMinimum);
   EXPECT_THAT(estimate.reason, ::testing::HasSubstr("keyframes in a row"));
+}
+
+// For 1.5 s every match is wrong: that ends the estimate, or it begins anew from the last state that fitted and says
+// so.
+TEST(SlidingWindow, BeginsAnewAfterAFailureWhereItMay) {
+  auto s = sim::simulate(scenario(), {1, 13});
+  const core::TimeNs first_ns = s.measurements.frames.front().t_cam_ns;
+  const core::RandomStream random({1, 13}, "sliding_window_test");
+  for (core::Frame& frame : s.measurements.frames) {
+    const double t_s = core::to_seconds(frame.t_cam_ns - first_ns);
+    if (t_s < 2.0 || t_s > 3.5) continue;
+    for (core::PointObservation& o : frame.points) {
+      const auto at =
+          random.uniforms(static_cast<std::uint64_t>(frame.t_cam_ns), static_cast<std::uint64_t>(o.track_id));
+      o.pixel = Eigen::Vector2d(at[0] * s.measurements.camera.width_px, at[1] * s.measurements.camera.height_px);
+    }
+  }
+  estimator::EstimatorConfig config = online();
+  const core::EstimateLog ended = estimator::estimate(s.measurements, config);
+  EXPECT_NE(ended.status, core::SolveStatus::kConverged);
+  EXPECT_FALSE(ended.reason.empty());
+  EXPECT_FALSE(ended.restarts.has_value());
+  config.window.restarts = 3;
+  const core::EstimateLog again = estimator::estimate(s.measurements, config);
+  ASSERT_EQ(again.status, core::SolveStatus::kConverged) << again.reason;
+  EXPECT_GE(again.restarts.value(), 1);
+  const core::StampedState& last = again.states.back();
+  const core::StateTangent d = core::minus(last.state, sim::state_at(s.truth, last.t_ns));
+  for (int i = 0; i < 3; ++i) EXPECT_LT(std::abs(d[i]), 4.5 * sigma_of(again, core::kCovLastState + i)) << i;
+  EXPECT_LT(std::abs(errors_of(again, s.truth).td_s), 4.5 * sigma_of(again, core::kCovTd));
 }
 
 TEST(SlidingWindow, LinesHelpOnline) {

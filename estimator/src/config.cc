@@ -50,6 +50,10 @@ static void visit(core::ConfigVisitor& v, WindowConfig& c) {
           "until then its inverse depth is that of this depth, give or take as much");
   v.value("outlier_sigma", c.outlier_sigma, core::positive(),
           "an observation is given up where a solution leaves it further away than this many sigmas");
+  v.value(
+      "restarts", c.restarts, core::at_least(0),
+      "how often it may begin anew after a failure, from the last state that fitted, carried on by the IMU; the metric "
+      "`restarts` counts them");
 }
 
 void visit(core::ConfigVisitor& v, EstimatorConfig& c) {

@@ -25,8 +25,9 @@ struct Failure {
 
 class OnlineEstimate {
  public:
-  OnlineEstimate(const core::MeasurementLog& log, const EstimatorConfig& config)
-      : log_(log), config_(config), window_(log, config) {
+  OnlineEstimate(const core::MeasurementLog& log, const EstimatorConfig& config) : log_(log), config_(config) {
+    window_.emplace(log, config);
+    if (config.window.restarts > 0) result_.restarts = 0;
     result_.td_estimated = config.estimate.td;
     result_.readout_estimated = config.estimate.readout;
     result_.extrinsics_estimated = config.estimate.extrinsics;
@@ -34,16 +35,16 @@ class OnlineEstimate {
 
   std::optional<Failure> run() {
     for (const std::size_t frame : select_keyframes(log_.frames, config_.keyframe_rate_hz)) {
-      if (!newest_stays_) window_.drop_newest();
+      if (!newest_stays_) window_->drop_newest();
       newest_stays_ = true;
-      if (!window_.add_frame(frame)) continue;
-      if (auto failure = step()) return failure;
+      const std::optional<Failure> failure = advance(frame);
+      if (failure && !begin_anew()) return failure;
     }
     if (result_.state_history.empty()) {
       return Failure{core::SolveStatus::kFailedInitialisation, "no keyframe could be used"};
     }
     result_.status = core::SolveStatus::kConverged;
-    result_.calibration = window_.calibration();
+    result_.calibration = window_->calibration();
     result_.covariance = covariance_;
     return std::nullopt;
   }
@@ -51,27 +52,64 @@ class OnlineEstimate {
   core::EstimateLog take() { return std::move(result_); }
 
  private:
+  std::optional<Failure> advance(std::size_t frame) {
+    try {
+      if (!window_->add_frame(frame)) return std::nullopt;
+      return step();
+    } catch (const std::domain_error& error) {
+      return Failure{core::SolveStatus::kDiverged, error.what()};
+    }
+  }
+
+  // From the last state that fitted; false where there is none, or no restart is left.
+  bool begin_anew() {
+    if (!sound_ || result_.restarts.value_or(0) >= config_.window.restarts) return false;
+    ++*result_.restarts;
+    window_.emplace(log_, config_, *sound_);
+    unsolved_ = misfits_ = rejections_ = 0;
+    return true;
+  }
+
+  // The newest state and the calibration as a prior: the state as uncertain as it is or as the initial one was,
+  // whichever is more, the calibration as uncertain as at first.
+  core::InitialPrior as_prior(core::TimeNs t_ns) const {
+    core::InitialPrior prior = log_.prior;
+    prior.t_ns = t_ns;
+    prior.mean = prior.start = unpack_state(window_->newest().x.data());
+    prior.calibration = prior.start_calibration = window_->calibration();
+    const auto widen = [&](double& sigma, int first) {
+      const auto variances = covariance_.diagonal().segment<3>(core::kCovLastState + first);
+      sigma = std::max(sigma, std::sqrt(variances.maxCoeff()));
+    };
+    widen(prior.sigma.position_m, core::kPosition);
+    widen(prior.sigma.orientation_rad, core::kOrientation);
+    widen(prior.sigma.velocity_m_s, core::kVelocity);
+    widen(prior.sigma.gyro_bias_rad_s, core::kGyroBias);
+    widen(prior.sigma.accel_bias_m_s2, core::kAccelBias);
+    return prior;
+  }
+
   std::optional<Failure> step() {
-    const core::TimeNs t_ns = log_.imu[window_.newest().sample].t_ns;
-    window_.triangulate();
+    const core::TimeNs t_ns = log_.imu[window_->newest().sample].t_ns;
+    window_->triangulate();
     std::optional<WindowSolution> solution;
     WindowFit fit;
     int outliers = 0;
     // Where td and the depths are still to be found, a wrong match would be taken for motion.
-    if (!window_.folded()) {
-      window_.solve(true);
-      outliers += window_.assess(true).outliers;
+    if (!window_->folded()) {
+      window_->solve(true);
+      outliers += window_->assess(true).outliers;
     }
     constexpr int kMaxRounds = 4;
     for (int round = 0; round < kMaxRounds; ++round) {
-      solution = window_.solve();
+      solution = window_->solve();
       result_.summary.iterations += solution->result.iterations;
       if (solution->result.status == core::SolveStatus::kDiverged) break;
       if (must_retime()) {
-        window_.retime(window_.calibration().td_s);
+        window_->retime(window_->calibration().td_s);
         continue;
       }
-      fit = window_.assess(round + 1 < kMaxRounds);
+      fit = window_->assess(round + 1 < kMaxRounds);
       outliers += fit.outliers;
       if (fit.outliers == 0) break;
     }
@@ -83,13 +121,14 @@ class OnlineEstimate {
     summarise(*solution, fit);
     covariance_ = *solution->covariance;
     record(t_ns);
+    if (unsolved_ == 0 && misfits_ == 0 && rejections_ == 0) sound_ = as_prior(t_ns);
     newest_stays_ =
-        window_.size() < 3 || !(window_.parallax_of_newest_px().value_or(1e9) < config_.window.keyframe_parallax_px);
+        window_->size() < 3 || !(window_->parallax_of_newest_px().value_or(1e9) < config_.window.keyframe_parallax_px);
     if (!newest_stays_) return std::nullopt;
     const bool td_is_known =
         !config_.estimate.td || std::sqrt(covariance_(core::kCovTd, core::kCovTd)) < config_.window.freeze_td_sigma_s;
-    const int most = td_is_known || window_.folded() ? config_.window.keyframes : config_.window.start_keyframes;
-    while (window_.size() > static_cast<std::size_t>(std::max(most, config_.window.keyframes))) window_.fold_oldest();
+    const int most = td_is_known || window_->folded() ? config_.window.keyframes : config_.window.start_keyframes;
+    while (window_->size() > static_cast<std::size_t>(std::max(most, config_.window.keyframes))) window_->fold_oldest();
     return std::nullopt;
   }
 
@@ -102,9 +141,9 @@ class OnlineEstimate {
     const double squares_per_residual = fit.visual.residuals > 0 ? fit.visual.squares / fit.visual.residuals : 0.0;
     count(unsolved_, solution.result.status == core::SolveStatus::kIterationLimit);
     count(misfits_, squares_per_residual > config_.max_cost_per_dof);
-    count(rejections_, 2 * outliers > window_.observations_of_newest());
+    count(rejections_, 2 * outliers > window_->observations_of_newest());
     const std::string since = fmt::format("of {} keyframes in a row up to {} ns", kPatience, t_ns);
-    if (unsolved_ >= kPatience && window_.folded()) {
+    if (unsolved_ >= kPatience && window_->folded()) {
       return Failure{
           core::SolveStatus::kIterationLimit,
           fmt::format("the windows {} took more than estimator.max_iterations = {}", since, config_.max_iterations)};
@@ -131,12 +170,12 @@ class OnlineEstimate {
   }
 
   bool must_retime() const {
-    return !window_.folded() && !config_.state_td_s &&
-           std::abs(window_.calibration().td_s - window_.timing_td_s()) > kRetimeS;
+    return !window_->folded() && !config_.state_td_s &&
+           std::abs(window_->calibration().td_s - window_->timing_td_s()) > kRetimeS;
   }
 
   void record(core::TimeNs t_ns) {
-    const core::State state = unpack_state(window_.newest().x.data());
+    const core::State state = unpack_state(window_->newest().x.data());
     const auto P = covariance_.block<core::kStateDof, core::kStateDof>(core::kCovLastState, core::kCovLastState);
     // Frames that an earlier td put later than this one now lies.
     const auto later = [&](const auto& entry) { return entry.t_ns >= t_ns; };
@@ -147,13 +186,14 @@ class OnlineEstimate {
     result_.state_history.push_back({t_ns, state, P});
     if (config_.estimate.td) {
       result_.td_history.push_back(
-          {t_ns, window_.calibration().td_s, std::sqrt(covariance_(core::kCovTd, core::kCovTd))});
+          {t_ns, window_->calibration().td_s, std::sqrt(covariance_(core::kCovTd, core::kCovTd))});
     }
   }
 
   const core::MeasurementLog& log_;
   const EstimatorConfig& config_;
-  Window window_;
+  std::optional<Window> window_;
+  std::optional<core::InitialPrior> sound_;  // the last state that fitted
   bool newest_stays_ = true;
   int unsolved_ = 0;  // keyframes in a row
   int misfits_ = 0;
@@ -166,12 +206,7 @@ class OnlineEstimate {
 
 core::EstimateLog estimate_in_window(const core::MeasurementLog& log, const EstimatorConfig& config) {
   OnlineEstimate online(log, config);
-  std::optional<Failure> failure;
-  try {
-    failure = online.run();
-  } catch (const std::domain_error& error) {
-    failure = Failure{core::SolveStatus::kDiverged, error.what()};
-  }
+  const std::optional<Failure> failure = online.run();
   core::EstimateLog result = online.take();
   if (failure) {
     result.status = failure->status;

@@ -16,13 +16,14 @@
 
 namespace plumbline::estimator {
 
-Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config)
+Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config, const core::InitialPrior& prior)
     : log_(log),
       config_(config),
+      calibration_sigma_(prior.calibration_sigma),
       noise_(believed_noise(config, log.imu_noise, log.pixel_sigma_px, log.line_sigma_px)),
-      extrinsics_(pack(log.prior.start_calibration.T_B_C)),
-      td_s_(log.prior.start_calibration.td_s),
-      readout_s_(log.prior.start_calibration.readout_s),
+      extrinsics_(pack(prior.start_calibration.T_B_C)),
+      td_s_(prior.start_calibration.td_s),
+      readout_s_(prior.start_calibration.readout_s),
       intrinsics_(log.camera.intrinsics()),
       timing_td_s_(config.state_td_s.value_or(td_s_)),
       usual_depth_(config.window.usual_depth_m),
@@ -38,12 +39,12 @@ Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config)
   line_model_.camera.pixel_sigma_px = noise_.line_sigma_px;
 
   auto first = std::make_unique<WindowFrame>();
-  first->sample = nearest_sample(log.imu, 0.0, log.prior.t_ns);
-  first->x = pack(log.prior.start);
-  initial_.push_back({std::make_unique<StatePriorFactor>(log.prior.mean, log.prior.sigma), first->x.data()});
+  first->sample = nearest_sample(log.imu, 0.0, prior.t_ns);
+  first->x = pack(prior.start);
+  initial_.push_back({std::make_unique<StatePriorFactor>(prior.mean, prior.sigma), first->x.data()});
   frames_.push_back(std::move(first));
-  const core::CalibrationSigmas& sigma = log.prior.calibration_sigma;
-  const core::RigCalibration& mean = log.prior.calibration;
+  const core::CalibrationSigmas& sigma = prior.calibration_sigma;
+  const core::RigCalibration& mean = prior.calibration;
   if (config.estimate.extrinsics) {
     initial_.push_back(
         {std::make_unique<ExtrinsicsPriorFactor>(mean.T_B_C, sigma.extrinsic_position_m, sigma.extrinsic_rotation_rad),
@@ -54,7 +55,7 @@ Window::Window(const core::MeasurementLog& log, const EstimatorConfig& config)
     initial_.push_back({std::make_unique<ScalarPriorFactor>(mean.readout_s, sigma.readout_s), &readout_s_});
   }
   if (config.estimate.intrinsics) {
-    intrinsics_ = log.prior.start_calibration.intrinsics.value();
+    intrinsics_ = prior.start_calibration.intrinsics.value();
     initial_.push_back(
         {std::make_unique<IntrinsicsPriorFactor>(mean.intrinsics.value(), sigma.focal_px, sigma.principal_point_px),
          intrinsics_.data()});
@@ -68,7 +69,7 @@ core::RigCalibration Window::calibration() const {
 }
 
 FrameTiming Window::timing_of(const WindowFrame& frame, const core::ImuBias& bias) const {
-  const core::CalibrationSigmas& sigma = log_.prior.calibration_sigma;
+  const core::CalibrationSigmas& sigma = calibration_sigma_;
   const double sample_s = core::to_seconds(log_.imu[1].t_ns - log_.imu[0].t_ns);
   // How far observations may yet move from their states: as far as the prior lets td and readout, at first.
   constexpr double kSettledS = 5e-3;

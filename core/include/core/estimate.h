@@ -101,6 +101,7 @@ struct EstimateLog {
   std::vector<LineEstimate> lines;
   int line_tracks = 0;                     // of lines that two keyframes or more see; estimated or not
   std::vector<OnlineState> state_history;  // empty where the estimator keeps none
+  std::optional<int> restarts;             // how often it began anew after a failure; absent where it may not
   SolveSummary summary;
 };
 

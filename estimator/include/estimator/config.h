@@ -61,6 +61,7 @@ struct WindowConfig {
   double largest_depth_sigma = 0.2;
   double usual_depth_m = 5.0;
   double outlier_sigma = 5.0;
+  int restarts = 0;
 };
 
 struct EstimatorConfig {

@@ -104,7 +104,9 @@ struct WindowFit {
 
 class Window {
  public:
-  Window(const core::MeasurementLog& log, const EstimatorConfig& config);
+  Window(const core::MeasurementLog& log, const EstimatorConfig& config) : Window(log, config, log.prior) {}
+  // From another prior than the recording's.
+  Window(const core::MeasurementLog& log, const EstimatorConfig& config, const core::InitialPrior& prior);
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
@@ -172,6 +174,7 @@ class Window {
 
   const core::MeasurementLog& log_;
   const EstimatorConfig& config_;
+  core::CalibrationSigmas calibration_sigma_;
   BelievedNoise noise_;
   PointModel point_model_;
   LineModel line_model_;
