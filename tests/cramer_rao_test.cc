@@ -158,9 +158,10 @@ core::PosteriorCovariance dense_bound(const core::MeasurementLog& log, const sim
     }
   }
   const Matrix Sigma = information.ldlt().solve(Matrix::Identity(columns, columns));
-  core::PosteriorCovariance P;
+  core::PosteriorCovariance P = core::PosteriorCovariance::Zero();
   const int last = column_of_state(samples.size() - 1);
-  P << Sigma.topLeftCorner(kCalibration, kCalibration).cast<double>(),
+  P.topLeftCorner<core::kCovIntrinsics, core::kCovIntrinsics>()
+      << Sigma.topLeftCorner(kCalibration, kCalibration).cast<double>(),
       Sigma.block(0, last, kCalibration, kDof).cast<double>(), Sigma.block(last, 0, kDof, kCalibration).cast<double>(),
       Sigma.block(last, last, kDof, kDof).cast<double>();
   return P;
