@@ -34,6 +34,12 @@ std::string title(const eval::Gate& gate) {
   return gate.name;
 }
 
+std::string ratio_text(const eval::MetricComparison& m) {
+  const std::string_view label = eval::metric_info(m.name).label;
+  return fmt::format("{} is {:.3f} times the baseline's{}", label.substr(0, label.find(" [")), m.ratio,
+                     m.ratio_ci95 ? fmt::format(" [{:.3f}, {:.3f}]", m.ratio_ci95->lo, m.ratio_ci95->hi) : "");
+}
+
 bool is_compared(const eval::Gate& gate) {
   return gate.kind != eval::GateKind::kConsistency && gate.verdict != eval::GateVerdict::kNotCompared;
 }
@@ -171,7 +177,8 @@ std::vector<std::string> night_findings(const NightReport& report) {
   for (const eval::Gate& gate : night.gates) {
     if (gate.verdict != eval::GateVerdict::kRed && gate.verdict != eval::GateVerdict::kBetter) continue;
     if (++told > kTold) continue;
-    findings.push_back(fmt::format("{}, {}: {}", word(gate.verdict), where(gate.experiment, gate.axes), gate.message));
+    findings.push_back(fmt::format("{}, {}: {}", word(gate.verdict), where(gate.experiment, gate.axes),
+                                   gate.comparison ? ratio_text(*gate.comparison) : gate.message));
   }
   if (told > kTold) findings.push_back(fmt::format("and {} more", told - kTold));
   for (const RuntimeChange& change : report.runtime) {

@@ -32,12 +32,13 @@ constexpr std::size_t kListedFailures = 50;
 constexpr std::array<const char*, 3> kRankedMetrics = {"td_error_s", "ate_position_m", "ate_rotation_deg"};
 constexpr std::array<const char*, 3> kTimedParts = {"simulate_s", "estimate_s", "evaluate_s"};
 
+using CellTimings = std::array<std::vector<double>, 3>;  // of kTimedParts, all trials
+
 // Over the trials of one cell that are ok.
 struct CellValues {
   std::vector<std::string> names;
   std::vector<std::vector<double>> values;  // a list a name
   std::vector<std::string> run_ids;
-  std::array<std::vector<double>, 3> timings;  // of kTimedParts, all trials
 
   const std::vector<double>* find(std::string_view name) const {
     const auto at = std::ranges::find(names, name);
@@ -50,9 +51,10 @@ struct Ranked {
   ordered_json json;
 };
 
-// All that is gathered in one pass over the rows.
+// All that is gathered in one pass over the rows, which come by cell: no more than the figures of one are held.
 struct Gathered {
-  std::vector<CellValues> cells;
+  ordered_json cells = ordered_json::array();
+  std::set<std::string> names;
   std::array<std::vector<Ranked>, 3> worst;  // of kRankedMetrics, at most kWorstOfAMetric, largest first
   ordered_json failures = ordered_json::array();
   ordered_json trials = nullptr;
@@ -91,48 +93,37 @@ void add_trial(ordered_json& trials, const eval::Row& row) {
   trials["metrics"].push_back(std::move(metrics));
 }
 
-Gathered gather(const Plan& plan, const fs::path& out) {
-  Gathered gathered;
-  gathered.cells.resize(plan.cells.size());
-  const bool list_trials = plan.runs() <= kListedTrials;
-  if (list_trials) gathered.trials = ordered_json::object();
-  for_each_result(out, plan.cells.size(), [&](const eval::Row& row) {
-    if (list_trials) add_trial(gathered.trials, row);
-    const ordered_json where = {{"cell", row.cell}, {"trial", row.trial}, {"replay", replay_command(out, row)}};
-    if (!row.ok) {
-      if (gathered.failures.size() < kListedFailures) {
-        ordered_json failure = where;
-        failure["status"] = row.status;
-        failure["reason"] = row.reason;
-        gathered.failures.push_back(std::move(failure));
-      }
-      return;
-    }
-    add_values(gathered.cells[static_cast<std::size_t>(row.cell)], row);
-    for (const eval::Metric& m : row.metrics) {
-      const auto at = std::ranges::find(kRankedMetrics, std::string_view(m.name));
-      if (at == kRankedMetrics.end()) continue;
-      ordered_json json = where;
-      json["metric"] = m.name;
-      json["value"] = rounded(m.value);
-      rank(gathered.worst[static_cast<std::size_t>(at - kRankedMetrics.begin())], std::abs(m.value), json);
-    }
-  });
-  return gathered;
+void add_failure(Gathered& gathered, const eval::Row& row, ordered_json where) {
+  if (gathered.failures.size() >= kListedFailures) return;
+  where["status"] = row.status;
+  where["reason"] = row.reason;
+  gathered.failures.push_back(std::move(where));
 }
 
-void gather_timings(Gathered& gathered, const fs::path& out) {
-  std::ifstream file(out / "timings.jsonl", std::ios::binary);
-  for (std::string line; std::getline(file, line);) {
-    const ordered_json json = ordered_json::parse(line);
-    auto& timings = gathered.cells.at(json.at("cell").get<std::size_t>()).timings;
-    for (std::size_t i = 0; i < kTimedParts.size(); ++i) {
-      timings[i].push_back(json.at(kTimedParts[i]).get<double>());
-    }
+void rank_errors(Gathered& gathered, const eval::Row& row, const ordered_json& where) {
+  for (const eval::Metric& m : row.metrics) {
+    const auto at = std::ranges::find(kRankedMetrics, std::string_view(m.name));
+    if (at == kRankedMetrics.end()) continue;
+    ordered_json json = where;
+    json["metric"] = m.name;
+    json["value"] = rounded(m.value);
+    rank(gathered.worst[static_cast<std::size_t>(at - kRankedMetrics.begin())], std::abs(m.value), json);
   }
 }
 
-ordered_json quantiles(const std::vector<double>& values, const std::vector<double>& levels) {
+std::vector<CellTimings> read_timings(const fs::path& out, std::size_t cells) {
+  std::vector<CellTimings> timings(cells);
+  std::ifstream file(out / "timings.jsonl", std::ios::binary);
+  for (std::string line; std::getline(file, line);) {
+    const ordered_json json = ordered_json::parse(line);
+    CellTimings& cell = timings.at(json.at("cell").get<std::size_t>());
+    for (std::size_t i = 0; i < kTimedParts.size(); ++i) cell[i].push_back(json.at(kTimedParts[i]).get<double>());
+  }
+  return timings;
+}
+
+ordered_json quantiles(std::vector<double> values, const std::vector<double>& levels) {
+  std::ranges::sort(values);  // once for all levels
   ordered_json json = ordered_json::array();
   for (const double p : levels) json.push_back(rounded(eval::quantile(values, p)));
   return json;
@@ -148,10 +139,10 @@ ordered_json ecdfs(const CellValues& cell) {
   return json;
 }
 
-ordered_json timing_json(const CellValues& cell) {
+ordered_json timing_json(const CellTimings& timings) {
   ordered_json json = ordered_json::object();
   for (std::size_t i = 0; i < kTimedParts.size(); ++i) {
-    const std::vector<double>& values = cell.timings[i];
+    const std::vector<double>& values = timings[i];
     if (values.empty()) continue;
     json[kTimedParts[i]] = {{"q", quantiles(values, {0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0})},
                             {"sum_s", rounded(eval::mean(values) * static_cast<double>(values.size()))}};
@@ -179,7 +170,7 @@ ordered_json paths(const CellValues& cell, const fs::path& out) {
 }
 
 ordered_json cell_json(const Cell& cell, const eval::CellSummary& summary, const CellValues& values,
-                       const fs::path& out, bool detailed) {
+                       const CellTimings& timings, const fs::path& out, bool detailed) {
   ordered_json json = eval::to_json(summary);
   for (auto& metric : json.at("metrics")) {
     for (auto& figure : metric) {
@@ -190,7 +181,7 @@ ordered_json cell_json(const Cell& cell, const eval::CellSummary& summary, const
   json["config_hash"] = cell.config_hash;
   json["td_s"] = cell.experiment.scenario.camera.td_s;
   json["ecdf"] = ecdfs(values);
-  json["timing"] = timing_json(values);
+  json["timing"] = timing_json(timings);
   if (!detailed) return json;
   std::vector<std::string> run_ids = values.run_ids;
   if (run_ids.size() > kSeriesOfACell) run_ids.resize(kSeriesOfACell);
@@ -199,12 +190,35 @@ ordered_json cell_json(const Cell& cell, const eval::CellSummary& summary, const
   return json;
 }
 
-ordered_json metrics_json(const std::vector<CellValues>& cells) {
-  std::set<std::string> present;
-  for (const CellValues& cell : cells) present.insert(cell.names.begin(), cell.names.end());
+Gathered gather(const Plan& plan, const fs::path& out, const std::vector<eval::CellSummary>& summaries) {
+  Gathered gathered;
+  const bool list_trials = plan.runs() <= kListedTrials;
+  if (list_trials) gathered.trials = ordered_json::object();
+  const std::vector<CellTimings> timings = read_timings(out, plan.cells.size());
+  CellValues values;
+  const auto close_cell = [&] {
+    const std::size_t c = gathered.cells.size();
+    gathered.names.insert(values.names.begin(), values.names.end());
+    gathered.cells.push_back(
+        cell_json(plan.cells[c], summaries[c], values, timings[c], out, static_cast<int>(c) < kDetailedCells));
+    values = {};
+  };
+  for_each_result(out, plan.cells.size(), [&](const eval::Row& row) {
+    while (gathered.cells.size() < static_cast<std::size_t>(row.cell)) close_cell();
+    if (list_trials) add_trial(gathered.trials, row);
+    const ordered_json where = {{"cell", row.cell}, {"trial", row.trial}, {"replay", replay_command(out, row)}};
+    if (!row.ok) return add_failure(gathered, row, where);
+    add_values(values, row);
+    rank_errors(gathered, row, where);
+  });
+  while (gathered.cells.size() < plan.cells.size()) close_cell();
+  return gathered;
+}
+
+ordered_json metrics_json(const std::set<std::string>& names) {
   ordered_json json = ordered_json::array();
   for (const eval::MetricInfo& info : eval::kMetrics) {
-    if (!present.contains(std::string(info.name))) continue;
+    if (!names.contains(std::string(info.name))) continue;
     json.push_back({{"name", info.name},
                     {"label", info.label},
                     {"scale", info.table_unit},
@@ -231,32 +245,27 @@ ordered_json provenance_json(const Plan& plan, const fs::path& out) {
 }  // namespace
 
 ordered_json report_data(const Plan& plan, const fs::path& out, const std::vector<eval::CellSummary>& cells) {
-  Gathered gathered = gather(plan, out);
-  gather_timings(gathered, out);
+  Gathered gathered = gather(plan, out, cells);
   Experiment first = plan.cells.front().experiment;
   first.experiment = plan.base.experiment;  // with its name
   const eval::Verdict verdict = eval::judge(cells, plan.base.experiment.max_failed_share);
-  ordered_json json = {{"kind", "sweep"},
-                       {"name", plan.base.experiment.name},
-                       {"verdict",
-                        {{"level", eval::kVerdictLevelNames[static_cast<std::size_t>(verdict.level)]},
-                         {"headline", verdict.headline},
-                         {"findings", verdict.findings}}},
-                       {"metrics", metrics_json(gathered.cells)},
-                       {"cells", ordered_json::array()},
-                       {"trials", std::move(gathered.trials)},
-                       {"worst", ordered_json::array()},
-                       {"failures", std::move(gathered.failures)},
-                       {"provenance", provenance_json(plan, out)},
-                       {"config", core::resolved_config(first)}};
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    json["cells"].push_back(
-        cell_json(plan.cells[c], cells[c], gathered.cells[c], out, static_cast<int>(c) < kDetailedCells));
-  }
+  ordered_json worst = ordered_json::array();
   for (auto& list : gathered.worst) {
-    for (Ranked& ranked : list) json["worst"].push_back(std::move(ranked.json));
+    for (Ranked& ranked : list) worst.push_back(std::move(ranked.json));
   }
-  return json;
+  return {{"kind", "sweep"},
+          {"name", plan.base.experiment.name},
+          {"verdict",
+           {{"level", eval::kVerdictLevelNames[static_cast<std::size_t>(verdict.level)]},
+            {"headline", verdict.headline},
+            {"findings", verdict.findings}}},
+          {"metrics", metrics_json(gathered.names)},
+          {"cells", std::move(gathered.cells)},
+          {"trials", std::move(gathered.trials)},
+          {"worst", std::move(worst)},
+          {"failures", std::move(gathered.failures)},
+          {"provenance", provenance_json(plan, out)},
+          {"config", core::resolved_config(first)}};
 }
 
 }  // namespace plumbline::tools

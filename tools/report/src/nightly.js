@@ -33,7 +33,7 @@ function gatesSection(data) {
     rmse("baseline", "rmse_a"), rmse("tonight", "rmse_b"),
     { title: "ratio", number: true, hint: "tonight over baseline, seed by seed; above 1 is worse", value: (g) => g.ratio, show: (g) => (g.ratio === undefined ? "" : g.ratio.toFixed(4)) },
     { title: "95 % interval", value: (g) => (g.ci95 ? `${g.ci95[0].toFixed(4)} to ${g.ci95[1].toFixed(4)}` : "") },
-    { title: "p", number: true, hint: "after Holm's correction for all comparisons of the night", value: (g) => g.p, show: (g) => (g.p === undefined ? "" : short(g.p)) },
+    { title: "p", number: true, hint: "after Holm's correction for all comparisons of the night", value: (g) => g.p, show: (g) => (g.p === undefined ? "" : g.p < 1e-3 ? g.p.toExponential(0) : short(g.p)) },
     { title: "found from", number: true, hint: "the smallest ratio that four of five such nights would find", value: (g) => g.detectable, show: (g) => (g.detectable ? g.detectable.toFixed(3) : "") },
     lookAt,
   ], rows.filter((g) => g.ratio !== undefined));
