@@ -2,7 +2,9 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <fstream>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -62,6 +64,12 @@ void require_no_file_above(const fs::path& path) {
     }
     if (folder == folder.parent_path()) return;
   }
+}
+
+void write_file_if_changed(const fs::path& path, std::string_view text) {
+  std::ostringstream old;
+  old << std::ifstream(path, std::ios::binary).rdbuf();
+  if (!fs::exists(path) || old.view() != text) write_file_atomically(path, text);
 }
 
 void replace_file_atomically(const fs::path& path, const std::function<void(const fs::path& temporary)>& write) {

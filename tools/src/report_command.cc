@@ -25,7 +25,7 @@ std::string markdown(const Plan& plan, const std::vector<eval::CellSummary>& cel
 
 void write_report(const Plan& plan, const fs::path& out, const std::vector<eval::CellSummary>& cells,
                   const fs::path& file) {
-  core::write_file_atomically(file, report_page(plan.base.experiment.name, report_data(plan, out, cells)));
+  core::write_file_if_changed(file, report_page(plan.base.experiment.name, report_data(plan, out, cells)));
 }
 
 int report(const ReportOptions& options) {

@@ -1,6 +1,5 @@
 #include <cstdio>
 #include <fstream>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -68,9 +67,7 @@ int conclude(const Plan& plan, const fs::path& out, SummaryOutput output) {
       {"experiment", plan.base.experiment.name}, {"git", commit()},     {"config_hash", plan.config_hash},
       {"error", eval::kErrorDefinition},         {"cells", json_cells}, {"runtime_s", mean_runtime(out)}};
   const std::string text = summary.dump(2) + "\n";
-  std::ostringstream old;
-  old << std::ifstream(out / "summary.json", std::ios::binary).rdbuf();
-  if (old.str() != text) core::write_file_atomically(out / "summary.json", text);
+  core::write_file_if_changed(out / "summary.json", text);
   write_report(plan, out, cells, out / kReportFile);
   if (output == SummaryOutput::kJson) {
     fmt::print("{}", text);

@@ -12,6 +12,9 @@ namespace plumbline::core {
 // Throws std::system_error naming the path; the temporary file is then removed.
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
+// The same, unless `path` holds just that already.
+void write_file_if_changed(const std::filesystem::path& path, std::string_view text);
+
 // For what is written piece by piece: `write` makes the file whose name it is given (PATH.tmp-PID), which then becomes
 // `path`, or goes where `write` throws. Throws DataError where `path` exists and is no regular file.
 void replace_file_atomically(const std::filesystem::path& path,
