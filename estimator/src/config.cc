@@ -56,9 +56,20 @@ static void visit(core::ConfigVisitor& v, WindowConfig& c) {
       "`restarts` counts them");
 }
 
+static void visit(core::ConfigVisitor& v, ExternalConfig& c) {
+  v.path("command", c.command, "the program; what is in its file is part of what the runs are");
+  v.value("arguments", c.arguments, "words between blanks, before `--dataset DIR --out DIR`");
+  v.value("environment", c.environment, "NAME=VALUE between blanks, on top of what `plumbline` has itself");
+  v.value("cpu_limit_s", c.cpu_limit_s, core::between(0.1, 1e6),
+          "processor time, rounded up to whole seconds; on the wall ten times as long. Reaching it is a failed trial");
+  v.value("memory_limit_mb", c.memory_limit_mb, core::between(0.0, 1e9), "address space; 0 is no limit");
+}
+
 void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
-  v.choice("type", c.type, kEstimatorTypeNames,
-           "`batch`: full maximum a posteriori; `sliding_window`: online, each state from the data up to it");
+  v.choice(
+      "type", c.type, kEstimatorTypeNames,
+      "`batch`: full maximum a posteriori; `sliding_window`: online, each state from the data up to it; `external`: "
+      "another program");
   v.choice("use", c.use, kObservationUseNames, "which observations enter");
   v.choice("timing", c.timing, kTimingModelNames,
            "camera timing; `propagated`: the pose at the observation's own time, by the IMU; `feature_velocity`: the "
@@ -84,6 +95,7 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.section("estimate", c.estimate, "what is free; the rest is held at the prior's mean");
   v.section("lines", c.lines, "which lines are estimated");
   v.section("window", c.window, "of `sliding_window`");
+  v.section("external", c.external, "of `external`");
   v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");
   v.value("max_cost_per_dof", c.max_cost_per_dof, core::positive(),
           "a mean squared whitened residual above it is a false minimum: a failed trial");

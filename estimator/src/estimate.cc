@@ -89,6 +89,8 @@ core::EstimateLog estimate(const core::MeasurementLog& log, const EstimatorConfi
       return estimate_batch(log, config);
     case EstimatorType::kSlidingWindow:
       return estimate_in_window(log, config);
+    case EstimatorType::kExternal:
+      break;  // not ours
   }
   throw std::logic_error("estimate: unknown type");
 }

@@ -4,7 +4,6 @@
 #include <exception>
 #include <mutex>
 #include <new>
-#include <stdexcept>
 #include <thread>
 
 namespace plumbline::eval {
@@ -14,6 +13,8 @@ TrialEnd run_here(const TrialRun& run, int index) {
     return {index, Outcome::kAnswer, run.trial(index)};
   } catch (const std::bad_alloc&) {
     return {index, Outcome::kOutOfMemory, "out of memory"};
+  } catch (const MachineFault& fault) {
+    return {index, Outcome::kKilled, fault.what()};
   } catch (const std::exception& error) {
     return {index, Outcome::kException, error.what()};
   } catch (...) {

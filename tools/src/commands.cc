@@ -15,6 +15,7 @@
 #include "sim/trajectory.h"
 #include "tools/experiment.h"
 #include "tools/export_results.h"
+#include "tools/external_estimator.h"
 #include "tools/plot.h"
 
 namespace plumbline::tools {
@@ -36,6 +37,20 @@ std::string load_as(ConfigKind kind, const std::filesystem::path& file, const st
       return "estimator";
   }
   throw std::logic_error("load_as: unknown kind");
+}
+
+int estimate_by_program(const core::MeasurementLog& log, const estimator::ExternalConfig& config,
+                        const std::filesystem::path& out) {
+  require_runnable(config);
+  const ExternalEstimate estimate = estimate_externally(log, config, out);
+  if (!estimate.failure.empty()) {
+    fmt::print(stderr, "plumbline: {}; its output is in {}\n", estimate.failure, out.generic_string());
+    return kExitWorse;
+  }
+  const core::EstimateLog& stated = estimate.stated.log;
+  fmt::print("{}{}{}, {} poses\nestimate: {}\n", core::kSolveStatusNames[static_cast<std::size_t>(stated.status)],
+             stated.reason.empty() ? "" : ": ", stated.reason, stated.states.size(), out.generic_string());
+  return stated.status == core::SolveStatus::kConverged ? kExitOk : kExitWorse;
 }
 
 }  // namespace
@@ -94,6 +109,7 @@ int estimate(const EstimateOptions& options) {
   refuse_existing(options.out);
   const estimator::EstimatorConfig config = load_estimator(options.estimator, options.set);
   const core::MeasurementLog log = core::read_dataset(options.dataset);
+  if (config.type == estimator::EstimatorType::kExternal) return estimate_by_program(log, config.external, options.out);
   const core::EstimateLog estimate = estimator::estimate(log, config);
   write_estimate(options.out, estimate);
   fmt::print("{}{}{}, {} iterations, cost per degree of freedom {:.4f}\n",

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/error.h"
 #include "eval/pose_consistency.h"
 #include "eval/statistics.h"
 #include "eval/trajectory_error.h"
@@ -21,13 +22,19 @@ struct Scored {
   EstimatedTrajectory estimate;
   eval::TrajectoryErrors errors;
   eval::PoseConsistencyResult consistency;
+  std::optional<double> td_error_s;  // of the middle row, where both know it
 };
 
 constexpr const char* kAligned = "covariances are compared with --align none only";
 
-Scored score(const EstimatedRun& run, const std::vector<core::StampedPose>& truth, const EvaluateOptions& options) {
-  Scored scored{.name = run.name, .estimate = read_estimate(run.path), .errors = {}, .consistency = {}};
-  scored.errors = eval::trajectory_errors(scored.estimate.poses, truth,
+Scored score(const EstimatedRun& run, const TrueTrajectory& truth, const EvaluateOptions& options) {
+  Scored scored{.name = run.name,
+                .estimate = read_estimate(run.path, {.deviations = options.deviations, .td_s = options.td_s}),
+                .errors = {},
+                .consistency = {},
+                .td_error_s = {}};
+  if (scored.estimate.td && truth.td_s) scored.td_error_s = scored.estimate.td->td_s - *truth.td_s;
+  scored.errors = eval::trajectory_errors(scored.estimate.poses, truth.poses,
                                           {.alignment = options.alignment,
                                            .first_n = options.first_n,
                                            .first_s = options.first_s,
@@ -45,6 +52,11 @@ ordered_json to_json(const Scored& scored, const EvaluateOptions& options) {
   ordered_json json = eval::to_json(scored.errors, options.alignment);
   json["stamp_clock"] = scored.estimate.stamp_clock;
   if (scored.estimate.td_s) json["stamps_moved_by_s"] = *scored.estimate.td_s;
+  if (const auto& td = scored.estimate.td) {
+    json["td"] = {{"estimate_s", td->td_s}};
+    if (td->sigma_s > 0.0) json["td"]["sigma_s"] = td->sigma_s;
+    if (scored.td_error_s) json["td"]["error_s"] = *scored.td_error_s;
+  }
   if (scored.consistency.consistency) json["consistency"] = eval::to_json(*scored.consistency.consistency);
   if (!scored.consistency.reason.empty()) json["no_consistency"] = scored.consistency.reason;
   return json;
@@ -103,6 +115,11 @@ void print_run(const Scored& scored, const EvaluateOptions& options) {
   line("ATE rotation [deg]", e.rotation_deg);
   line("ATE yaw [deg]", e.yaw_deg);
   line("ATE gravity [deg]", e.gravity_deg);
+  if (const auto& td = scored.estimate.td) {
+    fmt::print("\ntd {:.6f} ms{}{}, middle row\n", 1e3 * td->td_s,
+               td->sigma_s > 0.0 ? fmt::format(" (sigma {:.6f})", 1e3 * td->sigma_s) : "",
+               scored.td_error_s ? fmt::format(", error {:.6f} ms", 1e3 * *scored.td_error_s) : "");
+  }
   print_axes(scored);
   print_relative(e.relative);
 }
@@ -149,7 +166,7 @@ class RunTable {
 
 int evaluate_one(const EvaluateOptions& options) {
   const EstimatedRun run{.name = options.estimate.stem().string(), .path = options.estimate};
-  const Scored scored = score(run, read_true_poses(truth_of(run, options.truth)), options);
+  const Scored scored = score(run, read_true_trajectory(truth_of(run, options.truth)), options);
   if (options.json) {
     fmt::print("{}\n", to_json(scored, options).dump(2));
   } else {
@@ -161,12 +178,12 @@ int evaluate_one(const EvaluateOptions& options) {
 int evaluate_folder(const EvaluateOptions& options) {
   const std::vector<EstimatedRun> runs = list_estimates(options.estimate);
   // All is read before the first line is printed: unreadable input leaves no half a table.
-  std::map<std::filesystem::path, std::vector<core::StampedPose>> truths;
+  std::map<std::filesystem::path, TrueTrajectory> truths;
   std::vector<Scored> all;
   std::size_t width = 3;
   for (const EstimatedRun& run : runs) {
     const std::filesystem::path truth = truth_of(run, options.truth);
-    if (!truths.contains(truth)) truths.emplace(truth, read_true_poses(truth));
+    if (!truths.contains(truth)) truths.emplace(truth, read_true_trajectory(truth));
     all.push_back(score(run, truths.at(truth), options));
     width = std::max(width, run.name.size());
   }
@@ -195,6 +212,9 @@ int evaluate_folder(const EvaluateOptions& options) {
 int evaluate(const EvaluateOptions& options) {
   const bool many =
       std::filesystem::is_directory(options.estimate) && !std::filesystem::exists(options.estimate / "estimate.tum");
+  if (many && (options.deviations || options.td_s)) {
+    throw core::DataError(options.estimate.generic_string() + ": --std and --td are of one estimate");
+  }
   return many ? evaluate_folder(options) : evaluate_one(options);
 }
 

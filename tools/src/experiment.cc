@@ -17,6 +17,7 @@
 #include "sim/imu_sensor.h"
 #include "sim/trajectory.h"
 #include "sim/world.h"
+#include "tools/external_estimator.h"
 
 namespace plumbline::eval {
 
@@ -158,9 +159,13 @@ void check_cell(const Experiment& e) {
   const double pixel_sigma_px = e.scenario.camera.pixel_sigma_px;
   const double line_sigma_px = e.scenario.lines.sigma_px;
   const bool has_lines = e.scenario.lines.per_frame > 0;
-  estimator::require_usable(e.estimator,
-                            estimator::believed_noise(e.estimator, e.scenario.imu.noise, pixel_sigma_px, line_sigma_px),
-                            e.scenario.prior.calibration_sigmas(), has_lines);
+  if (e.estimator.type == estimator::EstimatorType::kExternal) {
+    require_runnable(e.estimator.external);
+  } else {
+    estimator::require_usable(
+        e.estimator, estimator::believed_noise(e.estimator, e.scenario.imu.noise, pixel_sigma_px, line_sigma_px),
+        e.scenario.prior.calibration_sigmas(), has_lines);
+  }
   if (e.metrics.crlb) {
     if (e.metrics.first_n > 0 || e.metrics.first_s > 0.0) {
       throw core::RuleError({"eval.crlb", "is of an alignment by all poses; leave out first_n and first_s"});

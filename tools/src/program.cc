@@ -129,6 +129,10 @@ int parse_and_run(int argc, const char* const* argv) {
                    "relative errors over frames (f), seconds, metres or % of the path")
       ->type_name("10m,1s,20f,10%")
       ->capture_default_str();
+  evaluate_command->add_option("--std", evaluate_options.deviations,
+                               "standard deviations beside OpenVINS's saved states");
+  evaluate_command->add_option("--td", evaluate_options.td_s,
+                               "the stamps are the camera's clock; move them by this estimated td [s]");
   evaluate_command->add_flag("--json", evaluate_options.json, "print JSON");
 
   CompareOptions compare_options;
@@ -167,6 +171,26 @@ int parse_and_run(int argc, const char* const* argv) {
       ->required()
       ->transform(CLI::CheckedTransformer(words<ResultsFormat>(kResultsFormatNames)));
   export_command->add_option("--out", export_options.out, "the file, which is replaced")->required();
+
+  ExportOptions dataset_options;
+  CLI::App* dataset_command = app.add_subcommand("export", "write a dataset for other programs");
+  dataset_command->add_option("DATASET", dataset_options.dataset, "folder of the dataset")->required();
+  dataset_command->add_option("--format", dataset_options.format, "tum, euroc, kalibr, openvins, vins or csv")
+      ->required()
+      ->transform(CLI::CheckedTransformer(words<ExportFormat>(kExportFormatNames)));
+  dataset_command->add_option("--out", dataset_options.out, "a new folder")->required();
+
+  ImportOptions import_options;
+  CLI::App* import_command = app.add_subcommand("import", "make a scenario of another program's rig");
+  import_command
+      ->add_option("RIG_FILE", import_options.files,
+                   "of Kalibr, OpenVINS or VINS, a folder of EuRoC, or poses (.tum, .txt, .csv)")
+      ->required();
+  import_command->add_option("--out", import_options.out, "a new scenario file")->required();
+  import_command->add_option("--imu-rate", import_options.imu_rate_hz, "Hz, where the files do not state it (VINS)")
+      ->check(CLI::PositiveNumber);
+  import_command->add_option("--pose-rate", import_options.pose_rate_hz, "Hz, of poses without stamps (KITTI)")
+      ->check(CLI::PositiveNumber);
 
   StatusOptions status_options;
   CLI::App* status_command = app.add_subcommand("status", "what of a sweep is done, failed and missing");
@@ -260,6 +284,8 @@ int parse_and_run(int argc, const char* const* argv) {
   if (*compare_command) return compare(compare_options);
   if (*nightly_command) return nightly(nightly_options);
   if (*export_command) return export_results(export_options);
+  if (*dataset_command) return export_dataset(dataset_options);
+  if (*import_command) return import_rig(import_options);
   if (*replay_command) return replay(replay_options);
   if (*ba_command) return ba(ba_options);
   if (*simulate_ba_command) return simulate_ba(simulate_ba_options);

@@ -12,6 +12,7 @@
 #include "output_folders.h"
 #include "sim/simulate.h"
 #include "tools/blas.h"
+#include "tools/external_estimator.h"
 #include "tools/sweep.h"
 
 namespace plumbline::tools {
@@ -48,7 +49,12 @@ void dump(const Plan& plan, const eval::Row& row, const fs::path& folder) {
   const sim::Simulation simulation = sim::simulate(cell.experiment.scenario, id);
   write_simulation(folder / "dataset", simulation,
                    {.config_hash = cell.config_hash, .seed = id.seed, .trial = id.trial});
-  write_estimate(folder / "estimate", estimator::estimate(simulation.measurements, cell.experiment.estimator));
+  const estimator::EstimatorConfig& config = cell.experiment.estimator;
+  if (config.type == estimator::EstimatorType::kExternal) {
+    estimate_externally(simulation.measurements, config.external, folder / "estimate");
+  } else {
+    write_estimate(folder / "estimate", estimator::estimate(simulation.measurements, config));
+  }
 }
 
 // The row and the series of a run as text.

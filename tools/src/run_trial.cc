@@ -1,11 +1,17 @@
 #include "tools/run_trial.h"
 
+#include <algorithm>
 #include <ctime>
+#include <iterator>
+
+#include <fmt/format.h>
 
 #include "estimator/estimate.h"
 #include "estimator/keyframes.h"
+#include "eval/association.h"
 #include "eval/metric_bound.h"
 #include "sim/simulate.h"
+#include "tools/external_estimator.h"
 
 // Of OpenMP. CHOLMOD asks for four threads whatever their number is set to; no level of parallel regions leaves it one.
 // It counts for the thread that calls it.
@@ -72,6 +78,57 @@ void add_bound(const Experiment& experiment, const core::MeasurementLog& measure
   result.series.bound = eval::bound_series(bound, start);
 }
 
+// What an estimate folder has no place for, and what this one leaves out, is no error of 0.
+void leave_out_unstated(const StatedEstimate& stated, std::vector<eval::Metric>& metrics) {
+  std::erase_if(metrics, [&](const eval::Metric& metric) {
+    const std::string_view name = metric.name;
+    if (name == "final_velocity" || name == "final_state" || name == "joint" || name.ends_with("_bias")) return true;
+    if (name == "calibration" || name.starts_with("extrinsic")) return !stated.extrinsics;
+    if (name == "td_first_error_s") return !stated.td || !stated.readout;
+    if (name.starts_with("td_")) return !stated.td;
+    return name == "readout_error_s" && !stated.readout;
+  });
+}
+
+// Of the true poses from the first frame to the last.
+double coverage_of_frames(const core::EstimateLog& estimate, const core::MeasurementLog& measurements,
+                          const sim::GroundTruth& truth) {
+  if (measurements.frames.empty()) return 0.0;
+  std::vector<core::StampedPose> estimated;
+  estimated.reserve(estimate.states.size());
+  for (const core::StampedState& s : estimate.states) estimated.push_back({s.t_ns, s.state.T_W_B});
+  const core::TimeNs td_ns = core::to_ns(truth.calibration.td_s);
+  std::vector<core::StampedPose> seen;
+  for (const core::StampedState& s : truth.states) {
+    const core::TimeNs t_cam_ns = s.t_ns - td_ns;
+    if (t_cam_ns < measurements.frames.front().t_cam_ns || t_cam_ns > measurements.frames.back().t_cam_ns) continue;
+    seen.push_back({s.t_ns, s.state.T_W_B});
+  }
+  return eval::associate(estimated, seen).coverage;
+}
+
+eval::TrialResult failed(std::string_view status, std::string reason) {
+  eval::TrialResult result;
+  result.status = status;
+  result.reason = std::move(reason);
+  return result;
+}
+
+eval::TrialResult evaluate_external(const ExternalEstimate& estimate, const core::MeasurementLog& measurements,
+                                    const sim::GroundTruth& truth, const eval::MetricsConfig& config) {
+  if (!estimate.failure.empty()) return failed("external", estimate.failure);
+  eval::TrialResult result = eval::evaluate(estimate.stated.log, truth, config);
+  if (!result.ok) return result;
+  constexpr double kLeastCoverage = 0.9;
+  const double coverage = coverage_of_frames(estimate.stated.log, measurements, truth);
+  if (coverage < kLeastCoverage) {
+    return failed("unusable",
+                  fmt::format("the poses cover {:.1f} % of the frames' time, less than 90 %", 100.0 * coverage));
+  }
+  leave_out_unstated(estimate.stated, result.metrics);
+  return result;
+}
+
 }  // namespace
 
 std::string reason_to_claim_nothing(const Experiment& experiment) {
@@ -90,9 +147,19 @@ eval::TrialResult run_trial(const Experiment& experiment, core::TrialId trial, T
   TrialTimings t;
   const auto [measurements, truth] = sim::simulate(experiment.scenario, trial);
   t.simulate_s = clock.lap();
-  const core::EstimateLog estimate = estimator::estimate(measurements, experiment.estimator);
-  t.estimate_s = clock.lap();
-  eval::TrialResult result = eval::evaluate(estimate, truth, experiment.metrics);
+  ExternalEstimate external;
+  core::EstimateLog& estimate = external.stated.log;
+  eval::TrialResult result;
+  if (experiment.estimator.type == estimator::EstimatorType::kExternal) {
+    const ScratchFolder scratch;
+    external = estimate_externally(measurements, experiment.estimator.external, scratch.path() / "out");
+    t.estimate_s = clock.lap() + external.cpu_s;
+    result = evaluate_external(external, measurements, truth, experiment.metrics);
+  } else {
+    estimate = estimator::estimate(measurements, experiment.estimator);
+    t.estimate_s = clock.lap();
+    result = eval::evaluate(estimate, truth, experiment.metrics);
+  }
   if (experiment.metrics.crlb && result.ok) {
     add_bound(experiment, measurements, truth, estimate.states.front().t_ns, result);
   }

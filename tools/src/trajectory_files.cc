@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 
 #include <fmt/format.h>
 
-#include "core/config_tree.h"
 #include "core/error.h"
 #include "core/pose_formats.h"
+#include "openvins_states.h"
 #include "sim/truth_files.h"
+#include "tools/stated_estimate.h"
 
 namespace plumbline::tools {
 namespace {
@@ -27,55 +26,63 @@ bool is_pose_file(const fs::path& path) {
 
 bool is_dataset(const fs::path& path) { return fs::is_directory(path / "truth"); }
 
-double number(const core::ConfigTree& value, std::string_view key) {
-  double x = 0.0;
-  const std::string& text = value.scalar;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
-  if (value.kind != core::ConfigTree::Kind::kScalar || error != std::errc() || end != text.data() + text.size() ||
-      !std::isfinite(x)) {
-    throw core::config_error(value.origin, key, "must be a number");
-  }
-  return x;
+void move_to_imu_clock(double td_s, EstimatedTrajectory& estimate) {
+  estimate.stamp_clock = "camera";
+  estimate.td_s = td_s;
+  for (core::StampedPose& pose : estimate.poses) pose.t_ns += core::to_ns(td_s);
 }
 
-// Reads the clock from meta.yaml and moves the stamps to the IMU's.
-void apply_clock(const fs::path& meta, EstimatedTrajectory& estimate) {
-  const core::ConfigTree tree = core::load_config_file(meta);
-  const core::ConfigTree* clock = core::find_value(tree, "stamp_clock");
-  if (clock == nullptr) throw core::config_error(tree.origin, "stamp_clock", "missing: imu or camera");
-  estimate.stamp_clock = clock->scalar;
-  if (clock->scalar == "imu") return;
-  if (clock->scalar != "camera") throw core::config_error(clock->origin, "stamp_clock", "must be imu or camera");
-
-  const core::ConfigTree* td = core::find_value(tree, "td_s");
-  if (td == nullptr) td = core::find_value(tree, "calibration.td_s");
-  if (td == nullptr) {
-    throw core::config_error(clock->origin, "td_s", "missing: stamps of the camera's clock need the estimated td");
+EstimatedTrajectory read_file(const fs::path& file, const EstimateHints& hints) {
+  EstimatedTrajectory estimate;
+  if (is_openvins_states(file)) {
+    OpenvinsStates states = read_openvins_states(file);
+    if (hints.deviations) add_openvins_deviations(*hints.deviations, states);
+    estimate.poses = std::move(states.poses);
+    estimate.covariances = std::move(states.covariances);
+    estimate.stamp_clock = "imu";
+    estimate.td = states.td.back();
+    return estimate;
   }
-  estimate.td_s = number(*td, "td_s");
-  constexpr double kLargest = 3600.0;
-  if (std::abs(*estimate.td_s) > kLargest) throw core::config_error(td->origin, "td_s", "must be within an hour");
-  for (core::StampedPose& pose : estimate.poses) pose.t_ns += core::to_ns(*estimate.td_s);
+  if (hints.deviations) {
+    throw core::DataError(file.generic_string() + ": holds no states of OpenVINS, as --std asks for");
+  }
+  core::PoseFile poses = core::read_poses(file, {.allow_unusable = true});
+  estimate.poses = std::move(poses.poses);
+  if (poses.format == core::PoseFormat::kTum) estimate.covariances = core::read_tum_covariances(file);
+  return estimate;
+}
+
+EstimatedTrajectory read_folder(const fs::path& folder) {
+  EstimatedTrajectory estimate = read_file(folder / kEstimateFile, {});
+  if (!fs::exists(folder / "meta.yaml")) return estimate;
+  const EstimateMeta meta = read_estimate_meta(folder / "meta.yaml");
+  estimate.stamp_clock = meta.stamp_clock;
+  if (meta.stamp_clock == "camera") move_to_imu_clock(meta.td_s.value_or(0.0), estimate);
+  if (meta.td_s && meta.td_reference_row) {
+    estimate.td = {.t_ns = estimate.poses.back().t_ns,
+                   .td_s = core::td_middle_from(*meta.td_s, meta.readout_s.value_or(0.0), *meta.td_reference_row),
+                   .sigma_s = meta.td_sigma_s.value_or(0.0)};
+  }
+  return estimate;
 }
 
 }  // namespace
 
-EstimatedTrajectory read_estimate(const fs::path& path) {
-  const bool folder = fs::is_directory(path);
-  const fs::path file = folder ? path / kEstimateFile : path;
-  EstimatedTrajectory estimate;
-  core::PoseFile poses = core::read_poses(file, {.allow_unusable = true});
-  estimate.poses = std::move(poses.poses);
-  if (poses.format == core::PoseFormat::kTum) estimate.covariances = core::read_tum_covariances(file);
-  if (folder && fs::exists(path / "meta.yaml")) apply_clock(path / "meta.yaml", estimate);
+EstimatedTrajectory read_estimate(const fs::path& path, const EstimateHints& hints) {
+  EstimatedTrajectory estimate = fs::is_directory(path) ? read_folder(path) : read_file(path, hints);
+  if (hints.td_s) {
+    estimate.td = {.t_ns = estimate.poses.back().t_ns, .td_s = *hints.td_s, .sigma_s = 0.0};
+    move_to_imu_clock(*hints.td_s, estimate);
+  }
   return estimate;
 }
 
-std::vector<core::StampedPose> read_true_poses(const fs::path& path) {
-  if (!fs::is_directory(path)) return core::read_poses(path).poses;
-  std::vector<core::StampedPose> poses;
-  for (const core::StampedState& s : sim::read_truth(path).states) poses.push_back({s.t_ns, s.state.T_W_B});
-  return poses;
+TrueTrajectory read_true_trajectory(const fs::path& path) {
+  if (!fs::is_directory(path)) return {.poses = core::read_poses(path).poses, .td_s = std::nullopt};
+  const sim::GroundTruth truth = sim::read_truth(path);
+  TrueTrajectory trajectory{.poses = {}, .td_s = truth.calibration.td_s};
+  for (const core::StampedState& s : truth.states) trajectory.poses.push_back({s.t_ns, s.state.T_W_B});
+  return trajectory;
 }
 
 std::vector<EstimatedRun> list_estimates(const fs::path& folder) {

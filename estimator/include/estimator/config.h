@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "core/calibration.h"
@@ -12,8 +14,8 @@
 
 namespace plumbline::estimator {
 
-enum class EstimatorType { kBatch, kSlidingWindow };
-inline constexpr std::array<std::string_view, 2> kEstimatorTypeNames = {"batch", "sliding_window"};
+enum class EstimatorType { kBatch, kSlidingWindow, kExternal };
+inline constexpr std::array<std::string_view, 3> kEstimatorTypeNames = {"batch", "sliding_window", "external"};
 enum class TimingModel { kPropagated, kFeatureVelocity };
 inline constexpr std::array<std::string_view, 2> kTimingModelNames = {"propagated", "feature_velocity"};
 enum class Initialisation { kPrior };
@@ -64,6 +66,15 @@ struct WindowConfig {
   int restarts = 0;
 };
 
+// Of `external`: a program that is given the dataset (docs/interoperability.md). None of the other keys is its.
+struct ExternalConfig {
+  std::filesystem::path command;
+  std::string arguments;
+  std::string environment;
+  double cpu_limit_s = 600.0;
+  double memory_limit_mb = 4096.0;
+};
+
 struct EstimatorConfig {
   EstimatorType type = EstimatorType::kBatch;
   ObservationUse use = ObservationUse::kPointsAndLines;
@@ -82,6 +93,7 @@ struct EstimatorConfig {
   EstimateWhat estimate;
   LineRules lines;
   WindowConfig window;
+  ExternalConfig external;
   int max_iterations = 50;
   double max_cost_per_dof = 2.0;
 };

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,12 @@ enum class Outcome {
   kOutOfMemory,  // std::bad_alloc
   kCpuLimit,
   kKilled,  // from outside, as by the kernel when memory runs out
+};
+
+// What a trial throws where the machine took its answer: kKilled.
+class MachineFault : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 struct TrialEnd {

@@ -108,6 +108,9 @@ struct EvaluateOptions {
   int first_n = 0;
   double first_s = 0.0;
   std::string deltas{eval::kDefaultDeltas};  // of the relative errors
+  // Of one file (tools/trajectory_files.h).
+  std::optional<std::filesystem::path> deviations;
+  std::optional<double> td_s;
   bool json = false;
 };
 int evaluate(const EvaluateOptions& options);
@@ -144,6 +147,25 @@ struct ExportResultsOptions {
   std::filesystem::path out;  // a file, which is replaced
 };
 int export_results(const ExportResultsOptions& options);
+
+enum class ExportFormat { kTum, kEuroc, kKalibr, kOpenvins, kVins, kCsv };
+inline constexpr std::array<std::string_view, 6> kExportFormatNames = {"tum",      "euroc", "kalibr",
+                                                                       "openvins", "vins",  "csv"};
+
+struct ExportOptions {
+  std::filesystem::path dataset;
+  ExportFormat format = ExportFormat::kTum;
+  std::filesystem::path out;
+};
+int export_dataset(const ExportOptions& options);
+
+struct ImportOptions {
+  std::vector<std::filesystem::path> files;  // rigs (tools/rig.h) and pose files
+  std::filesystem::path out;
+  std::optional<double> imu_rate_hz;   // of files that do not state it
+  std::optional<double> pose_rate_hz;  // of KITTI's poses
+};
+int import_rig(const ImportOptions& options);
 
 struct ReplayOptions {
   std::filesystem::path results;              // the folder of a sweep

@@ -1,5 +1,6 @@
 // Trajectories to be compared, from files of other programs or of our own.
-//   an estimate   a pose file (TUM, TUM with covariance, EuRoC CSV), or a folder with estimate.tum and meta.yaml
+//   an estimate   a pose file (TUM, TUM with covariance, EuRoC and VINS CSV, OpenVINS's total state), or a folder with
+//                 estimate.tum and meta.yaml
 //   a truth       a pose file, or a dataset with its truth
 // Poses come back in the IMU clock. meta.yaml states `stamp_clock: imu | camera`; stamps of the camera's clock are
 // moved by the estimate's own `td_s` (or `calibration.td_s`), t_imu = t_cam + td: that is the instant it claims the
@@ -12,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "core/estimate.h"
 #include "core/pose_covariance_file.h"
 #include "core/pose_file.h"
 
@@ -22,11 +24,23 @@ struct EstimatedTrajectory {
   std::vector<core::PoseCovariance> covariances;  // one a pose, or none
   std::string stamp_clock = "undeclared";         // or imu, camera
   std::optional<double> td_s;                     // what stamps of the camera's clock were moved by
+  std::optional<core::TimeOffsetEstimate> td;     // the last estimate, middle row; where one is stated
+};
+
+// What the files do not say themselves.
+struct EstimateHints {
+  std::optional<std::filesystem::path> deviations;  // beside OpenVINS's states
+  std::optional<double> td_s;                       // the stamps are the camera's, and this is the estimated td
+};
+
+struct TrueTrajectory {
+  std::vector<core::StampedPose> poses;
+  std::optional<double> td_s;  // of a dataset, middle row
 };
 
 // Throws core::DataError or core::ConfigError for what cannot be read.
-EstimatedTrajectory read_estimate(const std::filesystem::path& path);
-std::vector<core::StampedPose> read_true_poses(const std::filesystem::path& path);
+EstimatedTrajectory read_estimate(const std::filesystem::path& path, const EstimateHints& hints = {});
+TrueTrajectory read_true_trajectory(const std::filesystem::path& path);
 
 struct EstimatedRun {
   std::string name;  // of the folder, or of the file without its ending
