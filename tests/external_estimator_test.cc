@@ -252,7 +252,7 @@ TEST_F(ExternalEstimator, ACommandMustBeAProgram) {
   EXPECT_THAT(text.err, HasSubstr("scenario.yaml is no program"));
   const ProgramResult environment =
       plumbline("run experiment.yaml --out out --set estimator.external.environment=FAST" + choose(kPython));
-  EXPECT_THAT(environment.err, HasSubstr("estimator.external.environment: 'FAST' is not NAME=VALUE"));
+  EXPECT_THAT(environment.err, HasSubstr("estimator.external.environment=FAST: 'FAST' is not NAME=VALUE"));
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
