@@ -122,9 +122,9 @@ std::vector<eval::FreshNees> fresh_nees(const NightCell& cell, const std::vector
     eval::FreshNees nees{.name = name, .dof = 0, .n = 0, .mean = 0.0};
     for (const eval::Row& row : cell.fresh) {
       const auto at = std::ranges::find(row.metrics, name, &eval::Metric::name);
-      if (!row.ok || at == row.metrics.end() || !at->nees) continue;
+      if (!row.ok || at == row.metrics.end() || at->nees_dof == 0) continue;
       nees.dof = at->nees_dof;
-      nees.mean += *at->nees;
+      nees.mean += at->nees.value_or(0.0);
       ++nees.n;
     }
     if (nees.n == 0 || nees.n < static_cast<int>(cell.fresh.size())) continue;
