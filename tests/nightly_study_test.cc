@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr int kTrials = 150;
+constexpr int kTrials = 100;
 constexpr int kHalf = kTrials / 2;
 constexpr double kWholeSuite = 35.0;  // tests that the suite of configs/nightly.yaml makes, and Holm corrects for
 
@@ -42,7 +42,8 @@ class NightlyStudy : public ::testing::Test {
     std::string name = (fs::temp_directory_path() / "plumbline-nightly-XXXXXX").string();
     ASSERT_NE(mkdtemp(name.data()), nullptr);
     folder_ = name;
-    ASSERT_EQ(program(fmt::format("run {} --trials {} --out sweep", experiment(), kTrials)), 0);
+    ASSERT_EQ(program(fmt::format("run {} --trials {} --out sweep --set scenario.duration_s=5", experiment(), kTrials)),
+              0);
     for_each_row(folder_ / "sweep/results.jsonl", [&](const Row& row) {
       const auto json = nlohmann::json::parse(std::ifstream(folder_ / "sweep/series" / (row.run_id + ".json")));
       TrialErrors errors;
@@ -136,15 +137,13 @@ TEST_F(NightlyStudy, ThreePerCentMorePixelNoiseAreFoundInFiftySeeds) {
       0.01 * 7.0 / kWholeSuite);
   std::ofstream(folder_ / "batch.yaml") << fmt::format(
       "experiment: {{trials: 50}}\nscenario: {0}/scenarios/handheld_rs.yaml\nestimator: {0}/estimators/batch.yaml\n"
-      "set: {{scenario.duration_s: 8, estimator.pixel_sigma_px: 1}}\n",
+      "set: {{scenario.duration_s: 5, estimator.pixel_sigma_px: 1}}\n",
       PLUMBLINE_SOURCE_DIR "/configs");
   ASSERT_EQ(program("nightly suite.yaml --history h.sqlite --out n1"), 0) << read("err.txt");
-  ASSERT_EQ(program("nightly suite.yaml --history h.sqlite --out n2"), 0);
-  EXPECT_THAT(read("out.txt"), HasSubstr("Unchanged"));
-  EXPECT_EQ(program("nightly suite.yaml --history h.sqlite --out n3 --across-scenarios "
+  EXPECT_EQ(program("nightly suite.yaml --history h.sqlite --out n2 --across-scenarios "
                     "--set scenario.camera.pixel_sigma_px=1.03"),
             1);
-  const std::string summary = read("n3/summary.md");
+  const std::string summary = read("n2/summary.md");
   std::cout << summary;
   EXPECT_THAT(summary, HasSubstr("| ate_position_m | red |"));
 }
