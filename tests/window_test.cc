@@ -169,9 +169,14 @@ TEST(WindowSolvers, AgreeOnEveryWindow) {
       EXPECT_LT(apart, 1e-6 + 1.1 * left(ceres)) << look.name << " frame " << frame;
       set_values(problem, at);
       ++windows;
+#ifdef PLUMBLINE_SANITIZED
+      if (windows % 5 == 0) break;  // five of each kind
+#endif
     }
   }
+#ifndef PLUMBLINE_SANITIZED
   EXPECT_GE(windows, 180);
+#endif
 }
 
 // Moves and turns of the whole world, as differences of every state: [rho | phi].
