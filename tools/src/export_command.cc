@@ -1,5 +1,4 @@
 #include <fstream>
-#include <optional>
 #include <sstream>
 #include <stdexcept>
 
@@ -96,9 +95,11 @@ void write_csv_tables(const fs::path& dataset, const fs::path& out) {
   if (fs::exists(dataset / kTruth)) copy_table(dataset / kTruth, out / "trajectory.csv", kImuSays);
 }
 
-// None for what holds no calibration.
-std::optional<RigFormat> rig_format_of(ExportFormat format) {
+// Tables have no layout of their own for a calibration: Kalibr's is the one that most programs read.
+RigFormat rig_format_of(ExportFormat format) {
   switch (format) {
+    case ExportFormat::kTum:
+    case ExportFormat::kCsv:
     case ExportFormat::kKalibr:
       return RigFormat::kKalibr;
     case ExportFormat::kOpenvins:
@@ -107,9 +108,6 @@ std::optional<RigFormat> rig_format_of(ExportFormat format) {
       return RigFormat::kVins;
     case ExportFormat::kEuroc:
       return RigFormat::kEuroc;
-    case ExportFormat::kTum:
-    case ExportFormat::kCsv:
-      return std::nullopt;
   }
   throw std::logic_error("rig_format_of: unknown format");
 }
@@ -119,8 +117,7 @@ std::optional<RigFormat> rig_format_of(ExportFormat format) {
 int export_dataset(const ExportOptions& options) {
   refuse_existing(options.out);
   const core::MeasurementLog log = core::read_dataset(options.dataset);
-  const std::optional<RigFormat> rig_format = rig_format_of(options.format);
-  const Rig rig = rig_format ? rig_of(log) : Rig{};
+  const Rig rig = rig_of(log);
   std::vector<core::StampedState> states;
   if (fs::exists(options.dataset / kTruth)) {
     states = sim::read_truth(options.dataset).states;
@@ -128,7 +125,7 @@ int export_dataset(const ExportOptions& options) {
     throw core::DataError(fmt::format("{}: holds no truth, of which the poses are", options.dataset.generic_string()));
   }
   fs::create_directories(options.out);
-  if (rig_format) write_rig(options.out, rig, *rig_format);
+  write_rig(options.out, rig, rig_format_of(options.format));
   switch (options.format) {
     case ExportFormat::kTum:
     case ExportFormat::kKalibr:

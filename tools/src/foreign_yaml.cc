@@ -93,9 +93,10 @@ Eigen::Quaterniond quaternion(const Eigen::Matrix3d& R, const ConfigTree& tree, 
         fmt::format("is not a rotation: R R^T is off the identity by {:.3g}, its determinant {:.3g}", error,
                     R.determinant()));
   }
-  Eigen::Quaterniond q = Eigen::Quaterniond(R).normalized();
+  Eigen::Quaternion<long double> q(R.cast<long double>());
+  q.normalize();
   if (q.w() < 0.0) q.coeffs() = -q.coeffs();
-  return q;
+  return q.cast<double>();
 }
 
 Eigen::Matrix3d rotation(const ConfigTree& tree, std::string_view key) {

@@ -49,6 +49,8 @@ template <class Numbers>
 std::string list(const Numbers& numbers) {
   return fmt::format("[{}]", fmt::join(numbers.begin(), numbers.end(), ", "));
 }
+// Each element the nearest double, so that the quaternion comes back to 15 decimals.
+Eigen::Matrix3d rotation_matrix(const Eigen::Quaterniond& q);
 // The rows of the 4 x 4 matrix, each as a list.
 std::vector<std::string> rows_of(const core::Pose& T);
 

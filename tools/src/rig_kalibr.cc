@@ -52,9 +52,13 @@ core::Distortion parse_distortion(const ConfigTree& cam, std::string_view coeffi
 
 }  // namespace
 
+Eigen::Matrix3d rotation_matrix(const Eigen::Quaterniond& q) {
+  return q.cast<long double>().normalized().toRotationMatrix().cast<double>();
+}
+
 std::vector<std::string> rows_of(const core::Pose& T) {
   Eigen::Matrix<double, 4, 4, Eigen::RowMajor> M = Eigen::Matrix4d::Identity();
-  M.topLeftCorner<3, 3>() = T.q.toRotationMatrix();
+  M.topLeftCorner<3, 3>() = rotation_matrix(T.q);
   M.topRightCorner<3, 1>() = T.p;
   std::vector<std::string> rows;
   rows.reserve(4);

@@ -109,7 +109,7 @@ std::vector<TextFile> vins_files(const Rig& rig) {
       "imu_rate_hz: {}\nacc_n: {}\ngyr_n: {}\nacc_w: {}\ngyr_w: {}\ng_norm: {}\n\n"
       "# t_imu = t_cam + td, of the middle row: VINS counts rows from there.\nestimate_td: 1\ntd: {}\n"
       "rolling_shutter: {}\nrolling_shutter_tr: {}  # s, first row to last\n{}",
-      vins_camera_text(rig.camera), vins_matrix_text("extrinsicRotation", c.T_B_C.q.toRotationMatrix()),
+      vins_camera_text(rig.camera), vins_matrix_text("extrinsicRotation", rotation_matrix(c.T_B_C.q)),
       vins_matrix_text("extrinsicTranslation", c.T_B_C.p), rig.imu_rate_hz, n.accel_noise_density * root,
       n.gyro_noise_density * root, n.accel_bias_walk * root, n.gyro_bias_walk * root, rig.gravity_m_s2, c.td_s,
       c.readout_s != 0.0 ? 1 : 0, c.readout_s, kStockText);
