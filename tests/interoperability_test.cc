@@ -429,6 +429,7 @@ TEST_F(Interoperability, OpenvinsStatesAreEvaluated) {
   EXPECT_LT(scored["ate_rotation_deg"]["max"], 1e-5);  // nine decimals
   EXPECT_NEAR(scored["td"]["error_s"].get<double>(), 0.002, 1e-12);
   EXPECT_EQ(scored["td"]["sigma_s"], 0.001);
+  EXPECT_TRUE(scored["td"]["convergence_s"].is_null());
   EXPECT_NEAR(scored["consistency"]["nees_position"].get<double>(), 4.0, 1e-6);  // (0.1 / 0.05)^2
   EXPECT_EQ(plumbline("evaluate states.txt --truth data --json").code, 0);
   EXPECT_THAT(plumbline("evaluate states.txt --truth data").out, HasSubstr("error 2.000000 ms, middle row"));
@@ -457,6 +458,24 @@ TEST_F(Interoperability, VinsResultsAreMovedByTheirTd) {
   EXPECT_NEAR(moved["td"]["error_s"].get<double>(), 0.014 - 0.0123, 1e-15);
   const json unmoved = json::parse(plumbline("evaluate vins.csv --truth data --align none --json").out);
   EXPECT_GT(unmoved["ate_position_m"]["rmse"], 1e-3);
+}
+
+// td of the first row, 13.55 ms below that of the middle one, in the camera's clock.
+TEST_F(Interoperability, AHistoryOfTdTellsWhenItConverged) {
+  simulate("distortion: none");
+  ASSERT_EQ(plumbline("export data --format tum --out x").code, 0);
+  fs::rename(folder_ / "x/trajectory.tum", folder_ / "x/estimate.tum");
+  write("x/meta.yaml", "stamp_clock: imu\ntd_s: -0.001\ntd_reference_row: first\nreadout_s: 0.0271\n");
+  write("x/td.csv", "#t_ns,td_s\n500000000,-0.001\n1000000000,0.001\n1500000000,-0.0021\n1900000000,-0.0003\n");
+  const json scored = json::parse(plumbline("evaluate x --truth data --json").out);
+  EXPECT_NEAR(scored["td"]["error_s"].get<double>(), 0.01255 - 0.0123, 1e-15);
+  const double first_s = core::to_seconds(sim::read_truth(folder_ / "data").states.front().t_ns);
+  EXPECT_NEAR(scored["td"]["convergence_s"].get<double>(), 1.5 - first_s, 1e-9);
+  EXPECT_THAT(plumbline("evaluate x --truth data").out, HasSubstr("td within 1 ms for good: after 1.500 s"));
+  write("x/td.csv", "#t_ns,td_s\n500000000,-0.001\n500000000,0.001\n");
+  const ProgramResult twice = plumbline("evaluate x --truth data");
+  EXPECT_EQ(twice.code, 2);
+  EXPECT_EQ(twice.err, "plumbline: x/td.csv:3: stamps must increase\n");
 }
 
 TEST_F(Interoperability, BadFilesGiveOneClearLine) {

@@ -172,13 +172,10 @@ std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const Covar
 std::optional<Metric> td_convergence(const core::EstimateLog& estimate, double td_s, double bound_s) {
   const auto& history = estimate.td_history;
   if (history.empty()) return std::nullopt;
-  const auto outside = [&](const core::TimeOffsetEstimate& h) { return !(std::abs(h.td_s - td_s) <= bound_s); };
-  // One past the last instant at which the error was too large.
-  const auto settled = std::find_if(history.rbegin(), history.rend(), outside).base();
-  const bool never = settled == history.end();
-  const core::TimeNs t_ns = never ? history.back().t_ns : settled->t_ns;
+  const std::optional<core::TimeNs> settled = td_settles_at(history, td_s, bound_s);
+  const core::TimeNs t_ns = settled.value_or(history.back().t_ns);
   Metric metric{std::string(kTdConvergence), core::to_seconds(t_ns - estimate.states.front().t_ns)};
-  metric.censored = never;
+  metric.censored = !settled;
   return metric;
 }
 

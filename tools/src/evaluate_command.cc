@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "eval/pose_consistency.h"
 #include "eval/statistics.h"
+#include "eval/td_convergence.h"
 #include "eval/trajectory_error.h"
 #include "tools/commands.h"
 #include "tools/trajectory_files.h"
@@ -22,7 +23,8 @@ struct Scored {
   EstimatedTrajectory estimate;
   eval::TrajectoryErrors errors;
   eval::PoseConsistencyResult consistency;
-  std::optional<double> td_error_s;  // of the middle row, where both know it
+  std::optional<double> td_error_s;    // of the middle row, where both know it
+  std::optional<double> td_settled_s;  // since the first pose; nothing where it never did
 };
 
 constexpr const char* kAligned = "covariances are compared with --align none only";
@@ -32,8 +34,14 @@ Scored score(const EstimatedRun& run, const TrueTrajectory& truth, const Evaluat
                 .estimate = read_estimate(run.path, {.deviations = options.deviations, .td_s = options.td_s}),
                 .errors = {},
                 .consistency = {},
-                .td_error_s = {}};
-  if (scored.estimate.td && truth.td_s) scored.td_error_s = scored.estimate.td->td_s - *truth.td_s;
+                .td_error_s = {},
+                .td_settled_s = {}};
+  if (scored.estimate.td && truth.td_s) {
+    scored.td_error_s = scored.estimate.td->td_s - *truth.td_s;
+    if (const auto t_ns = eval::td_settles_at(scored.estimate.td_history, *truth.td_s, eval::kTdBoundS)) {
+      scored.td_settled_s = core::to_seconds(*t_ns - scored.estimate.poses.front().t_ns);
+    }
+  }
   scored.errors = eval::trajectory_errors(scored.estimate.poses, truth.poses,
                                           {.alignment = options.alignment,
                                            .first_n = options.first_n,
@@ -56,6 +64,9 @@ ordered_json to_json(const Scored& scored, const EvaluateOptions& options) {
     json["td"] = {{"estimate_s", td->td_s}};
     if (td->sigma_s > 0.0) json["td"]["sigma_s"] = td->sigma_s;
     if (scored.td_error_s) json["td"]["error_s"] = *scored.td_error_s;
+    if (scored.td_error_s && !scored.estimate.td_history.empty()) {
+      json["td"]["convergence_s"] = scored.td_settled_s ? ordered_json(*scored.td_settled_s) : ordered_json(nullptr);
+    }
   }
   if (scored.consistency.consistency) json["consistency"] = eval::to_json(*scored.consistency.consistency);
   if (!scored.consistency.reason.empty()) json["no_consistency"] = scored.consistency.reason;
@@ -119,6 +130,10 @@ void print_run(const Scored& scored, const EvaluateOptions& options) {
     fmt::print("\ntd {:.6f} ms{}{}, middle row\n", 1e3 * td->td_s,
                td->sigma_s > 0.0 ? fmt::format(" (sigma {:.6f})", 1e3 * td->sigma_s) : "",
                scored.td_error_s ? fmt::format(", error {:.6f} ms", 1e3 * *scored.td_error_s) : "");
+    if (scored.td_error_s && !scored.estimate.td_history.empty()) {
+      fmt::print("td within {:g} ms for good: {}\n", 1e3 * eval::kTdBoundS,
+                 scored.td_settled_s ? fmt::format("after {:.3f} s", *scored.td_settled_s) : "never");
+    }
   }
   print_axes(scored);
   print_relative(e.relative);

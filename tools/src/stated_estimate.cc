@@ -90,20 +90,6 @@ double td_of_middle_row(const EstimateMeta& meta, double td_s) {
                               meta.td_reference_row.value_or(core::RowReference::kMiddle));
 }
 
-std::vector<core::TimeOffsetEstimate> read_td_history(const fs::path& file, const EstimateMeta& meta) {
-  std::vector<core::TimeOffsetEstimate> history;
-  core::CsvReader csv(file, 2, 1);
-  while (csv.next()) {
-    core::TimeOffsetEstimate& at = history.emplace_back();
-    at = {.t_ns = csv.integer(0),
-          .td_s = td_of_middle_row(meta, csv.number(1)),
-          .sigma_s = csv.has(2) ? csv.number(2) : 0.0};
-    if (meta.stamp_clock == "camera") at.t_ns += core::to_ns(csv.number(1));
-    if (history.size() > 1 && at.t_ns <= history[history.size() - 2].t_ns) csv.fail("stamps must increase");
-  }
-  return history;
-}
-
 }  // namespace
 
 EstimateMeta read_estimate_meta(const fs::path& file) {
@@ -132,6 +118,20 @@ EstimateMeta read_estimate_meta(const fs::path& file) {
     throw core::config_error(tree.origin, "readout_s", "missing: td of the first row needs it");
   }
   return meta;
+}
+
+std::vector<core::TimeOffsetEstimate> read_td_history(const fs::path& file, const EstimateMeta& meta) {
+  std::vector<core::TimeOffsetEstimate> history;
+  core::CsvReader csv(file, 2, 1);
+  while (csv.next()) {
+    core::TimeOffsetEstimate& at = history.emplace_back();
+    at = {.t_ns = csv.integer(0),
+          .td_s = td_of_middle_row(meta, csv.number(1)),
+          .sigma_s = csv.has(2) ? csv.number(2) : 0.0};
+    if (meta.stamp_clock == "camera") at.t_ns += core::to_ns(csv.number(1));
+    if (history.size() > 1 && at.t_ns <= history[history.size() - 2].t_ns) csv.fail("stamps must increase");
+  }
+  return history;
 }
 
 StatedEstimate read_stated_estimate(const fs::path& folder) {
@@ -169,7 +169,7 @@ StatedEstimate read_stated_estimate(const fs::path& folder) {
   log.td_estimated = stated.td && P(core::kCovTd, core::kCovTd) > 0.0;
   log.readout_estimated = stated.readout && P(core::kCovReadout, core::kCovReadout) > 0.0;
   log.extrinsics_estimated = stated.extrinsics && !P.topLeftCorner<6, 6>().isZero(0.0);
-  if (stated.td && fs::exists(folder / "td.csv")) log.td_history = read_td_history(folder / "td.csv", meta);
+  if (stated.td) log.td_history = trajectory.td_history;
   return stated;
 }
 

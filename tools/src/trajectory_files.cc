@@ -41,6 +41,7 @@ EstimatedTrajectory read_file(const fs::path& file, const EstimateHints& hints) 
     estimate.covariances = std::move(states.covariances);
     estimate.stamp_clock = "imu";
     estimate.td = states.td.back();
+    estimate.td_history = std::move(states.td);
     return estimate;
   }
   if (hints.deviations) {
@@ -62,6 +63,7 @@ EstimatedTrajectory read_folder(const fs::path& folder) {
     estimate.td = {.t_ns = estimate.poses.back().t_ns,
                    .td_s = core::td_middle_from(*meta.td_s, meta.readout_s.value_or(0.0), *meta.td_reference_row),
                    .sigma_s = meta.td_sigma_s.value_or(0.0)};
+    if (fs::exists(folder / "td.csv")) estimate.td_history = read_td_history(folder / "td.csv", meta);
   }
   return estimate;
 }

@@ -12,16 +12,17 @@
 #include "eval/alignment.h"
 #include "eval/metrics.h"
 #include "eval/series.h"
+#include "eval/td_convergence.h"
 #include "sim/ground_truth.h"
 
 namespace plumbline::eval {
 
 struct MetricsConfig {
   Alignment alignment = Alignment::kPosyaw;
-  int first_n = 0;           // poses that decide the alignment; 0: all
-  double first_s = 0.0;      // or those up to so long after the first; 0: all. Not both.
-  bool crlb = false;         // the Cramer-Rao bound of each trial
-  double td_bound_s = 1e-3;  // td_convergence_s: what |td error| must stay within
+  int first_n = 0;                // poses that decide the alignment; 0: all
+  double first_s = 0.0;           // or those up to so long after the first; 0: all. Not both.
+  bool crlb = false;              // the Cramer-Rao bound of each trial
+  double td_bound_s = kTdBoundS;  // td_convergence_s: what |td error| must stay within
 };
 
 struct SolverFigures {

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/calibration.h"
 #include "core/estimate.h"
@@ -29,6 +30,9 @@ struct EstimateMeta {
 
 // Throws core::ConfigError, `file:line: key: rule`.
 EstimateMeta read_estimate_meta(const std::filesystem::path& file);
+
+// td.csv, in the IMU clock and of the middle row. Throws core::DataError `file:line: rule`.
+std::vector<core::TimeOffsetEstimate> read_td_history(const std::filesystem::path& file, const EstimateMeta& meta);
 
 // As an estimator's own answer. Velocities and biases are none of the files'; they are zero, as is the covariance of
 // what is stated without one.

@@ -1,6 +1,6 @@
 // Trajectories to be compared, from files of other programs or of our own.
 //   an estimate   a pose file (TUM, TUM with covariance, EuRoC and VINS CSV, OpenVINS's total state), or a folder with
-//                 estimate.tum and meta.yaml
+//                 estimate.tum, meta.yaml and perhaps td.csv (tools/stated_estimate.h)
 //   a truth       a pose file, or a dataset with its truth
 // Poses come back in the IMU clock. meta.yaml states `stamp_clock: imu | camera`; stamps of the camera's clock are
 // moved by the estimate's own `td_s` (or `calibration.td_s`), t_imu = t_cam + td: that is the instant it claims the
@@ -25,6 +25,7 @@ struct EstimatedTrajectory {
   std::string stamp_clock = "undeclared";         // or imu, camera
   std::optional<double> td_s;                     // what stamps of the camera's clock were moved by
   std::optional<core::TimeOffsetEstimate> td;     // the last estimate, middle row; where one is stated
+  std::vector<core::TimeOffsetEstimate> td_history;
 };
 
 // What the files do not say themselves.
