@@ -364,6 +364,8 @@ TEST_F(Evaluate, OnlineNeesIsUnalignedAndPerBlock) {
   };
   const NeesPoint& point = result.series.nees[1];
   EXPECT_DOUBLE_EQ(point.t_s, 4.0);
+  EXPECT_NEAR(point.position / expected(0, 3), 1.0, 1e-6);
+  EXPECT_NEAR(point.orientation / expected(3, 3), 1.0, 1e-6);
   EXPECT_NEAR(point.pose / expected(0, 6), 1.0, 1e-6);
   EXPECT_NEAR(point.velocity / expected(6, 3), 1.0, 1e-6);
   EXPECT_NEAR(point.bias / expected(9, 6), 1.0, 1e-6);

@@ -197,6 +197,8 @@ std::vector<NeesPoint> online_nees(const core::EstimateLog& estimate, const sim:
       return *value;
     };
     points.push_back({.t_s = core::to_seconds(s.t_ns - estimate.states.front().t_ns),
+                      .position = block(core::kPosition, 3),
+                      .orientation = block(core::kOrientation, 3),
                       .pose = block(core::kPosition, 6),
                       .velocity = block(core::kVelocity, 3),
                       .bias = block(core::kGyroBias, 6)});

@@ -88,6 +88,8 @@ ordered_json to_json(const Series& series) {
   }
   if (!series.nees.empty()) {
     json["nees"] = {{"t_s", column(series.nees, &NeesPoint::t_s)},
+                    {"position", column(series.nees, &NeesPoint::position)},
+                    {"orientation", column(series.nees, &NeesPoint::orientation)},
                     {"pose", column(series.nees, &NeesPoint::pose)},
                     {"velocity", column(series.nees, &NeesPoint::velocity)},
                     {"bias", column(series.nees, &NeesPoint::bias)}};

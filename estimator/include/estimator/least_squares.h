@@ -54,7 +54,8 @@ bool evaluate(const LeastSquares& problem, const ResidualTerm& term, double* res
 
 struct LeastSquaresOptions {
   int max_iterations = 50;
-  // The last step's length in standard deviations, |delta|_H: what is left is about its square.
+  // The last step's length in standard deviations, |delta|_H: what is left is about its square. A damped step that
+  // lowers the cost by less than half of that is the last, too.
   double step_tolerance = 1e-2;
   // A step that lowers the cost by less than this share of it is the last, too.
   double cost_tolerance = 0.0;

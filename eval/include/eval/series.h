@@ -30,10 +30,12 @@ struct TimeOffsetPoint {
 
 // NEES of what was known at an instant, unaligned.
 struct NeesPoint {
-  double t_s = 0.0;       // since the first estimated state
-  double pose = 0.0;      // 6 dof, [position | orientation]
-  double velocity = 0.0;  // 3 dof
-  double bias = 0.0;      // 6 dof, [gyroscope | accelerometer]
+  double t_s = 0.0;          // since the first estimated state
+  double position = 0.0;     // 3 dof
+  double orientation = 0.0;  // 3 dof
+  double pose = 0.0;         // 6 dof, [position | orientation]
+  double velocity = 0.0;     // 3 dof
+  double bias = 0.0;         // 6 dof, [gyroscope | accelerometer]
 };
 
 // Roots of the Cramer-Rao bound from the measurements up to an instant (eval/cramer_rao.h), of a vector that of the
