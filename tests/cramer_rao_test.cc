@@ -48,7 +48,7 @@ estimator::BatchValues true_values(const estimator::BatchInput& input, const sim
     const auto view = estimator::observe_world_point(model, {motion, offset_s}, state, truth.calibration, P_W,
                                                      track.observations.front().pixel.y());
     estimator::TimedBody body;
-    EXPECT_TRUE(view && estimator::body_at(*motion, state, log.gravity_m_s2, view->tau_s, body));
+    EXPECT_TRUE(view && estimator::BodyPath(*motion, state, log.gravity_m_s2).at(view->tau_s, body));
     const core::Pose T_W_C = core::Pose{Eigen::Quaterniond(body.R), body.p} * truth.calibration.T_B_C;
     const Eigen::Vector3d P_C = T_W_C.inverse() * P_W;
     values.landmarks.emplace_back(Eigen::Vector3d(P_C.x() / P_C.z(), P_C.y() / P_C.z(), 1.0 / P_C.z()));

@@ -102,7 +102,7 @@ TEST(LocalMotion, MeetsTheCarriedStatesAtTheSamples) {
   for (const int offset : {-20, -7, -1, 0, 1, 6, 20}) {
     const State carried = carry(state, samples, kMiddle, kMiddle + static_cast<std::size_t>(offset), kGravity);
     TimedBody body;
-    ASSERT_TRUE(body_at(motion, state, kGravity, 0.005 * offset, body));
+    ASSERT_TRUE(BodyPath(motion, state, kGravity).at(0.005 * offset, body));
     EXPECT_LT((body.p - carried.T_W_B.p).norm(), 1e-13) << offset;
     EXPECT_LT((body.R - carried.T_W_B.q.toRotationMatrix()).norm(), 1e-13) << offset;
     // Within a midpoint step dp/dtau is the velocity to second order only: half the jerk times dt^2.

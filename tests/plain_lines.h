@@ -93,9 +93,33 @@ struct PlainVelocityLine {
   }
 };
 
-// PropagatedLineFactor. The foot on the curve F(u, v) = 0 is found by steps to its tangent; dF/dv comes from
-// differences a pixel wide, which is enough, since an error of the normal's direction enters the distance by its square
-// only.
+// estimator/factors/timed_line.h: the distance of end k from the curve F(u, v) = 0 over sigma, pose(v) the camera's as
+// row v is exposed. The foot is found by steps to the curve's tangent; dF/dv comes from differences a pixel wide, which
+// is enough, since an error of the normal's direction enters the distance by its square only.
+template <class T, class PoseOfRow>
+T plain_curve_distance(const PlainSegment& segment, std::size_t k, const std::array<Vector3<T>, 2>& points_W,
+                       const PoseOfRow& pose) {
+  const PlainSight& end = segment.ends[k];
+  const auto normal = [&](const T& v) -> Vector3<T> { return plain_normal(pose(v), points_W); };
+  Vector2<T> offset = Vector2<T>::Zero();  // of the foot from the observed end
+  T r(0);
+  for (int iteration = 0; iteration < 6; ++iteration) {
+    const auto F = [&](const Vector2<T>& at) -> T {
+      Vector3<T> b = end.b.cast<T>();
+      b.template head<2>() += end.D.cast<T>() * at;
+      return normal(T(end.pixel.y()) + at.y()).dot(b);
+    };
+    const Vector2<T> down(T(0), T(1));
+    const Vector3<T> n = normal(T(end.pixel.y()) + offset.y());
+    const Vector2<T> gradient(n.x() * T(end.D(0, 0)) + n.y() * T(end.D(1, 0)),
+                              (F(offset + down) - F(offset - down)) / T(2));
+    r = (F(offset) - gradient.dot(offset)) / gradient.norm();
+    offset = -gradient * (r / gradient.norm());
+  }
+  return r / T(segment.sigma_px);
+}
+
+// PropagatedLineFactor
 struct PlainPropagatedLine {
   PlainSegment segment;
   Eigen::Vector3d origin_W;
@@ -103,30 +127,12 @@ struct PlainPropagatedLine {
 
   template <class T>
   bool operator()(const T* state, const T* T_B_C, const T* td, const T* readout, const T* line, T* residual) const {
-    const auto points = plain_line_points(line, origin_W);
-    // The normal of the line as row v sees it.
-    const auto normal = [&](const T& v) -> Vector3<T> {
+    const auto pose = [&](const T& v) {
       const T tau = T(frame.offset_s) + *td + segment.phase(v) * *readout;
-      return plain_normal(frame.at(PlainState<T>(state), tau) * PlainPose<T>(T_B_C), points);
+      return frame.at(PlainState<T>(state), tau) * PlainPose<T>(T_B_C);
     };
     for (std::size_t k = 0; k < 2; ++k) {
-      const PlainSight& end = segment.ends[k];
-      Vector2<T> offset = Vector2<T>::Zero();  // of the foot from the observed end
-      T r(0);
-      for (int iteration = 0; iteration < 6; ++iteration) {
-        const auto F = [&](const Vector2<T>& at) -> T {
-          Vector3<T> b = end.b.cast<T>();
-          b.template head<2>() += end.D.cast<T>() * at;
-          return normal(T(end.pixel.y()) + at.y()).dot(b);
-        };
-        const Vector2<T> down(T(0), T(1));
-        const Vector3<T> n = normal(T(end.pixel.y()) + offset.y());
-        const Vector2<T> gradient(n.x() * T(end.D(0, 0)) + n.y() * T(end.D(1, 0)),
-                                  (F(offset + down) - F(offset - down)) / T(2));
-        r = (F(offset) - gradient.dot(offset)) / gradient.norm();
-        offset = -gradient * (r / gradient.norm());
-      }
-      residual[k] = r / T(segment.sigma_px);
+      residual[k] = plain_curve_distance<T>(segment, k, plain_line_points(line, origin_W), pose);
     }
     return true;
   }

@@ -7,6 +7,7 @@
 
 #include "estimator/batch_problem.h"
 #include "estimator/batch_start.h"
+#include "estimator/trajectory_spline.h"
 
 namespace plumbline::estimator {
 namespace {
@@ -17,7 +18,15 @@ constexpr double kRetimeS = 5e-3;
 constexpr double kRelineariseRad = 1e-5;
 constexpr double kFirstStageS = 2.0;
 
-bool biases_left_linearisation(const BatchInput& input, const BatchValues& from, const BatchValues& to) {
+// What a solution must not leave: the biases that preintegration was linearised about, or on a spline the segments that
+// the observations were put on, beyond which their polynomials go on with an error of this to the power of the degree.
+bool left_linearisation(const BatchInput& input, const BatchValues& from, const BatchValues& to) {
+  if (from.spline) {
+    constexpr double kSegmentShare = 1e-2;
+    const double moved_s = std::abs(to.calibration.td_s - from.calibration.td_s) +
+                           0.5 * std::abs(to.calibration.readout_s - from.calibration.readout_s);
+    return moved_s > kSegmentShare * from.spline->knots.interval_s;
+  }
   for (std::size_t i = 0; i + 1 < to.states.size(); ++i) {
     const double dt = core::to_seconds(input.log.imu[to.samples[i + 1]].t_ns - input.log.imu[to.samples[i]].t_ns);
     const double moved = (to.states[i].bias.gyro_rad_s - from.states[i].bias.gyro_rad_s).norm();
@@ -94,6 +103,30 @@ core::EstimateLog failed(std::string reason) {
   return log;
 }
 
+// Status, reason and covariance of the last solve.
+void conclude(const BatchInput& input, BatchProblem& problem, bool too_coarse, core::EstimateLog& result) {
+  if (result.summary.observations == 0) {
+    result.status = core::SolveStatus::kFailedInitialisation;
+    result.reason = "no observation could be used";
+  } else if (too_coarse) {
+    result.status = core::SolveStatus::kKnotsTooCoarse;
+    result.reason = fmt::format("knots {:.3g} s apart: the IMU's residuals exceed its noise by {:.3g} sigma",
+                                result.knots->interval_s, result.knots->excess_sigmas);
+  } else if (result.status == core::SolveStatus::kConverged && false_minimum(input, result.summary)) {
+    result.status = core::SolveStatus::kFalseMinimum;
+    result.reason = fmt::format("final cost {:.3g} per degree of freedom, above estimator.max_cost_per_dof = {}",
+                                result.summary.cost_per_dof(), input.config.max_cost_per_dof);
+  } else if (result.status != core::SolveStatus::kConverged) {
+    result.reason =
+        fmt::format("stopped after {} iterations at cost {:.6g}", result.summary.iterations, result.summary.final_cost);
+  } else if (const auto covariance = problem.covariance()) {
+    result.covariance = *covariance;
+  } else {
+    result.status = core::SolveStatus::kDiverged;
+    result.reason = "the information at the solution is singular";
+  }
+}
+
 core::EstimateLog grow_and_refine(const BatchInput& input) {
   const core::MeasurementLog& log = input.log;
   const EstimatorConfig& config = input.config;
@@ -107,13 +140,19 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
   double timing_td_s = config.state_td_s.value_or(log.prior.start_calibration.td_s);
   grow(input, values, timing_td_s);
 
-  // Refine until biases and td stay where the factors were linearised.
+  const bool on_spline = config.timing == TimingModel::kSpline;
+  const std::optional<double>& given_s = config.spline.knot_interval_s;
+  double knot_interval_s = 0.0;
+  if (on_spline) knot_interval_s = given_s ? *given_s : knot_interval_by_motion(input, values);
+
+  // Refine until the solution stays where the factors were linearised.
   constexpr int kMaxRounds = 6;
   core::EstimateLog result;
   int iterations = 0;
   bool restarted = false;
   for (int round = 0; round < kMaxRounds; ++round) {
     place_states(input, input.keyframes.size(), timing_td_s, values);
+    if (on_spline && !values.spline) values.spline = start_spline(input, values, knot_interval_s);
     triangulate_missing(input, values);
     BatchProblem problem(input, values);
     const BatchProblem::Outcome outcome = problem.solve();
@@ -121,11 +160,22 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
     iterations += outcome.summary.iterations;
     result.status = outcome.status;
     result.summary = outcome.summary;
+    result.knots = problem.knot_check();
 
-    const bool bad = outcome.status != core::SolveStatus::kConverged || false_minimum(input, outcome.summary);
+    const bool too_coarse = outcome.status == core::SolveStatus::kConverged && result.knots &&
+                            !(result.knots->excess_sigmas <= core::KnotCheck::kMostSigmas);
+    if (too_coarse && !given_s && round + 1 < kMaxRounds) {
+      knot_interval_s *= 0.5;
+      values = solved;
+      values.spline.reset();
+      continue;
+    }
+    const bool bad =
+        outcome.status != core::SolveStatus::kConverged || (!too_coarse && false_minimum(input, outcome.summary));
     if (bad && !restarted) {
       restarted = true;
       values = solved;
+      values.spline.reset();
       values.forget_landmarks();
       search(input, input.keyframes.size(), values, timing_td_s);
       continue;
@@ -138,29 +188,14 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
       }
     }
     const bool retime = must_retime(input, solved.calibration.td_s, timing_td_s);
-    if (!bad && (retime || biases_left_linearisation(input, values, solved)) && round + 1 < kMaxRounds) {
+    if (!bad && (retime || left_linearisation(input, values, solved)) && round + 1 < kMaxRounds) {
       if (retime) timing_td_s = solved.calibration.td_s;
       values = solved;
       continue;
     }
 
     values = solved;
-    if (outcome.summary.observations == 0) {
-      result.status = core::SolveStatus::kFailedInitialisation;
-      result.reason = "no observation could be used";
-    } else if (result.status == core::SolveStatus::kConverged && false_minimum(input, outcome.summary)) {
-      result.status = core::SolveStatus::kFalseMinimum;
-      result.reason = fmt::format("final cost {:.3g} per degree of freedom, above estimator.max_cost_per_dof = {}",
-                                  outcome.summary.cost_per_dof(), config.max_cost_per_dof);
-    } else if (result.status != core::SolveStatus::kConverged) {
-      result.reason = fmt::format("stopped after {} iterations at cost {:.6g}", outcome.summary.iterations,
-                                  outcome.summary.final_cost);
-    } else if (const auto covariance = problem.covariance()) {
-      result.covariance = *covariance;
-    } else {
-      result.status = core::SolveStatus::kDiverged;
-      result.reason = "the information at the solution is singular";
-    }
+    conclude(input, problem, too_coarse, result);
     break;
   }
 

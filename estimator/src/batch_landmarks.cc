@@ -15,6 +15,12 @@ BatchProblem::Timings BatchProblem::frame_timings() const {
   const double sample_s = core::to_seconds(input_.log.imu[1].t_ns - input_.log.imu[0].t_ns);
   const double margin_s = 0.5 * std::abs(readout_s_) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
   Timings timings;
+  if (spline_) {
+    for (const std::size_t frame : input_.keyframes) {
+      timings.push_back({nullptr, spline_->seconds(input_.log, input_.log.frames[frame].t_cam_ns)});
+    }
+    return timings;
+  }
   for (std::size_t k = 0; k + 1 < states_.size(); ++k) {
     const std::size_t sample = start_.samples[k + 1];
     const core::TimeNs t_cam_ns = input_.log.frames[input_.keyframes[k]].t_cam_ns;
@@ -79,6 +85,10 @@ bool BatchProblem::add_point(const PointModel& model, const Timings& timings, co
   }
   const std::size_t of_anchor = terms.size();
   for (auto o = track.observations.begin() + 1; o != track.observations.end() && o->keyframe < timings.size(); ++o) {
+    if (spline_) {
+      terms.push_back(spline_point(model, timings, first, *o));
+      continue;
+    }
     terms.push_back(
         {make_point_factor(model, anchor, view(*o)),
          {state_block(first.keyframe), state_block(o->keyframe), extrinsics_block_, td_block_, readout_block_}});
@@ -114,6 +124,10 @@ bool BatchProblem::add_line(const LineModel& model, const Timings& timings, std:
   std::vector<Term> terms;
   for (const LineTrackObservation& o : input_.line_tracks[track].observations) {
     if (o.keyframe >= timings.size()) break;
+    if (spline_) {
+      terms.push_back(spline_line(model, timings, o, line.origin_W));
+      continue;
+    }
     terms.push_back({make_line_factor(model, {timings[o.keyframe], o.ends_px, o.velocities}, line.origin_W),
                      {state_block(o.keyframe), extrinsics_block_, td_block_, readout_block_}});
   }

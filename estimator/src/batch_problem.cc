@@ -30,15 +30,19 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values, S
     : input_(input),
       phase_(phase),
       start_(values),
+      spline_(values.spline),
       extrinsics_(pack(values.calibration.T_B_C)),
       td_s_(values.calibration.td_s),
       readout_s_(values.calibration.readout_s),
       loss_(phase == SolvePhase::kSearch ? make_loss(RobustLoss::kCauchy, kSearchLossScale)
                                          : make_loss(input.config.loss, input.config.loss_scale)) {
-  for (const core::State& state : values.states) states_.push_back(pack(state));
-
-  for (StateBlock& state : states_) {
-    add_block({.values = state.data(), .size = kStateSize, .dof = core::kStateDof, .manifold = &state_manifold_});
+  if (spline_) {
+    add_spline_blocks();
+  } else {
+    for (const core::State& state : values.states) states_.push_back(pack(state));
+    for (StateBlock& state : states_) {
+      add_block({.values = state.data(), .size = kStateSize, .dof = core::kStateDof, .manifold = &state_manifold_});
+    }
   }
   const EstimateWhat& free = input_.config.estimate;
   extrinsics_block_ = add_block({.values = extrinsics_.data(),
@@ -46,6 +50,7 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values, S
                                  .dof = 6,
                                  .manifold = &pose_manifold_,
                                  .constant = !free.extrinsics});
+  problem_.first_shared = extrinsics_block_;
   td_block_ = add_block({.values = &td_s_, .size = 1, .dof = 1, .constant = !free.td});
   readout_block_ = add_block({.values = &readout_s_, .size = 1, .dof = 1, .constant = !free.readout});
 
@@ -55,7 +60,11 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values, S
   first_line_block_ = static_cast<int>(problem_.blocks.size());
   add_lines(timings);
   inertial_begin_ = problem_.terms.size();
-  add_inertial_factors();
+  if (spline_) {
+    add_spline_inertial_factors();
+  } else {
+    add_inertial_factors();
+  }
   prior_begin_ = problem_.terms.size();
   add_priors();
 }
@@ -79,7 +88,12 @@ void BatchProblem::add_priors() {
   const core::RigCalibration& mean = prior.calibration;
   const core::CalibrationSigmas& sigma = prior.calibration_sigma;
   const EstimateWhat& free = input_.config.estimate;
-  add_term({std::make_unique<StatePriorFactor>(prior.mean, prior.sigma), {0}}, nullptr);
+  if (spline_) {
+    const SplineInstant at = spline_->at(input_.log, prior.t_ns);
+    add_term({std::make_unique<SplineState>(spline_->knots, at, prior.mean, prior.sigma), blocks_at(at)}, nullptr);
+  } else {
+    add_term({std::make_unique<StatePriorFactor>(prior.mean, prior.sigma), {0}}, nullptr);
+  }
   if (free.extrinsics) {
     add_term(
         {std::make_unique<ExtrinsicsPriorFactor>(mean.T_B_C, sigma.extrinsic_position_m, sigma.extrinsic_rotation_rad),
@@ -148,6 +162,12 @@ BatchValues BatchProblem::values() const {
   BatchValues values = start_;
   values.calibration = {.T_B_C = unpack_pose(extrinsics_.data()), .td_s = td_s_, .readout_s = readout_s_};
   for (std::size_t i = 0; i < states_.size(); ++i) values.states[i] = unpack_state(states_[i].data());
+  if (spline_) {
+    values.spline = spline_;
+    for (std::size_t i = 0; i < values.states.size(); ++i) {
+      values.states[i] = state_on_spline(input_.log.imu[values.samples[i]].t_ns);
+    }
+  }
   values.forget_landmarks();
   for (std::size_t i = 0; i < landmarks_.size(); ++i) values.landmarks[landmark_tracks_[i]] = landmarks_[i];
   for (std::size_t i = 0; i < lines_.size(); ++i) values.lines[line_tracks_[i]] = lines_[i];
@@ -156,7 +176,9 @@ BatchValues BatchProblem::values() const {
 
 std::optional<core::PosteriorCovariance> BatchProblem::covariance() {
   if (!system_) system_.emplace(problem_);
-  return posterior_covariance(*system_, input_.config.estimate);
+  const EstimateWhat& free = input_.config.estimate;
+  if (!spline_) return posterior_covariance(*system_, free);
+  return posterior_covariance(*system_, free, newest_state_by_columns(*system_, calibration_columns(free)));
 }
 
 }  // namespace plumbline::estimator

@@ -32,6 +32,14 @@ static void visit(core::ConfigVisitor& v, LineRules& c) {
           "a line is given up where a solution leaves an end further from it than this many sigmas");
 }
 
+static void visit(core::ConfigVisitor& v, SplineConfig& c) {
+  v.value(
+      "knot_spacing_s", c.knot_interval_s, core::between(1e-3, 10.0), "motion",
+      "at most; `motion`: as wide as leaves nothing but noise in the IMU's samples. Where residuals of the IMU exceed "
+      "its noise at the solution, the knots of `motion` are doubled, and those that are given are a failed trial");
+  v.value("order", c.order, core::between(4, 6), "of the B-spline: 6 is quintic");
+}
+
 static void visit(core::ConfigVisitor& v, WindowConfig& c) {
   v.value("keyframes", c.keyframes, core::at_least(3), "states that stay");
   v.value("kept_points", c.kept_points, core::at_least(0),
@@ -71,9 +79,11 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
       "`batch`: full maximum a posteriori; `sliding_window`: online, each state from the data up to it; `external`: "
       "another program");
   v.choice("use", c.use, kObservationUseNames, "which observations enter");
-  v.choice("timing", c.timing, kTimingModelNames,
-           "camera timing; `propagated`: the pose at the observation's own time, by the IMU; `feature_velocity`: the "
-           "observation moved along its image velocity (VINS-Mono)");
+  v.choice(
+      "timing", c.timing, kTimingModelNames,
+      "camera timing; `propagated`: the pose at the observation's own time, by the IMU; `feature_velocity`: the "
+      "observation moved along its image velocity (VINS-Mono); `spline`: the pose at the observation's own time on a "
+      "cumulative B-spline, which the IMU's samples are measurements of (only of `batch`)");
   v.choice("residual", c.residual, kResidualTypeNames,
            "of a point; `pinhole`: pixels; `unit_sphere`: on the tangent plane of the observed bearing");
   v.choice("landmark", c.landmark, kLandmarkTypeNames,
@@ -94,6 +104,7 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.section("imu", c.imu, "IMU noise it believes in; must be given where the scenario's is 0");
   v.section("estimate", c.estimate, "what is free; the rest is held at the prior's mean");
   v.section("lines", c.lines, "which lines are estimated");
+  v.section("spline", c.spline, "of the timing `spline`");
   v.section("window", c.window, "of `sliding_window`");
   v.section("external", c.external, "of `external`");
   v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");

@@ -44,6 +44,9 @@ std::optional<std::string> gap_in_imu(const std::vector<core::ImuSample>& imu) {
 
 void require_usable(const EstimatorConfig& config, const BelievedNoise& noise, const core::CalibrationSigmas& sigma,
                     bool has_lines) {
+  if (config.timing == TimingModel::kSpline && config.type != EstimatorType::kBatch) {
+    throw core::RuleError({"estimator.timing", "spline needs estimator.type: batch"});
+  }
   const EstimateWhat& free = config.estimate;
   const std::string_view fallback = "it defaults to the scenario's, which";
   if (uses_points(config.use)) require_weight(noise.pixel_sigma_px, "estimator.pixel_sigma_px", fallback);

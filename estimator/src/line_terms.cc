@@ -6,7 +6,7 @@ namespace plumbline::estimator {
 
 std::unique_ptr<ceres::CostFunction> make_line_factor(const LineModel& model, const LineView& view,
                                                       const Eigen::Vector3d& origin_W) {
-  if (model.timing == TimingModel::kPropagated) {
+  if (model.timing != TimingModel::kFeatureVelocity) {
     return std::make_unique<PropagatedLineFactor>(model.camera, view.timing, origin_W, view.ends_px);
   }
   if (!view.velocities) throw std::invalid_argument("feature_velocity: a segment without velocities");

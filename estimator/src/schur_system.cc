@@ -14,7 +14,7 @@ namespace plumbline::estimator {
 namespace {
 
 constexpr int kMaxRows = core::kStateDof;
-constexpr int kMaxWidth = 2 * core::kStateDof + 12 + kLandmarkSize;  // two states, the calibration, a point that stays
+constexpr int kMaxWidth = 2 * 6 * kMostControls + 12;  // the controls of two segments and the calibration
 
 bool has_rotation(const ParameterBlock& block) { return block.size == kStateSize || block.size == kPoseSize; }
 
@@ -42,7 +42,7 @@ struct SchurSystem::Rows {
 
 SchurSystem::SchurSystem(const LeastSquares& problem) : problem_(problem), layout_(problem.blocks.size()) { lay_out(); }
 
-// The calibration, from the last pose on, is the border; every other block reaches down to the last that a landmark, a
+// What is shared is the border; every other block reaches down to the last that a landmark, a
 // term or the prior joins it with.
 void SchurSystem::lay_out() {
   int columns = 0;
@@ -52,7 +52,7 @@ void SchurSystem::lay_out() {
     if (block.eliminated) continue;
     layout_[i].column = columns;
     columns += block.dof;
-    if (block.size == kStateSize || block.size == kLandmarkSize) banded = columns;
+    if (static_cast<int>(i) < problem_.first_shared) banded = columns;
   }
   std::vector<int> reach(static_cast<std::size_t>(banded));
   std::vector<int> group;  // blocks

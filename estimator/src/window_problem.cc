@@ -27,6 +27,7 @@ int Window::Built::add(double* values, int size, int dof, const ceres::Manifold*
 void Window::add_calibration(Built& built) {
   const EstimateWhat& free = config_.estimate;
   built.extrinsics = built.add(extrinsics_.data(), kPoseSize, 6, &pose_manifold_);
+  built.problem.first_shared = built.extrinsics;
   built.problem.blocks.back().constant = !free.extrinsics;
   built.td = built.add(&td_s_, 1, 1, nullptr);
   built.problem.blocks.back().constant = !free.td;

@@ -236,6 +236,10 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
     result.metrics.push_back({std::string(kLineShare), lines.share});
   }
   if (estimate.restarts) result.metrics.push_back({"restarts", static_cast<double>(*estimate.restarts)});
+  if (estimate.knots) {
+    result.metrics.push_back({"knot_interval_s", estimate.knots->interval_s});
+    result.metrics.push_back({"knot_excess", estimate.knots->excess_sigmas});
+  }
   if (auto convergence = td_convergence(estimate, truth.calibration.td_s, config.td_bound_s)) {
     result.metrics.push_back(std::move(*convergence));
   }

@@ -7,13 +7,13 @@
 #include <Eigen/SparseCore>
 #include <fmt/format.h>
 
+#include "core/bspline_basis.h"
 #include "core/error.h"
-#include "sim/bspline_basis.h"
 
 namespace plumbline::sim {
 namespace {
 
-using bspline::kOrder;
+constexpr int kOrder = core::bspline::kMostOrder;
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
 struct Sample {
@@ -85,7 +85,7 @@ SparseMatrix basis_matrix(const std::vector<Sample>& samples, const Grid& grid) 
   for (std::size_t r = 0; r < samples.size(); ++r) {
     const double knots = (samples[r].t_s - grid.origin_s) / grid.knot_s;
     const int first = std::clamp(static_cast<int>(std::floor(knots)), 0, grid.controls - kOrder);
-    const bspline::Basis b = bspline::blending() * bspline::powers(knots - first, 0);
+    const core::bspline::Basis b = core::bspline::weights(kOrder, knots - first, grid.knot_s).plain[0];
     for (int j = 0; j < kOrder; ++j) entries.emplace_back(static_cast<int>(r), first + j, b[j]);
   }
   SparseMatrix B(static_cast<Eigen::Index>(samples.size()), grid.controls);

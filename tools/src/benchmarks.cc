@@ -125,15 +125,27 @@ estimator::Solver solver_of(const benchmark::State& state) {
 }
 
 // 15 s at 10 Hz.
-void batch_solve(benchmark::State& state) {
+void batch_solve(benchmark::State& state, estimator::TimingModel timing) {
   const sim::Simulation s = sim::simulate(handheld_rs(), {1, 0});
   estimator::EstimatorConfig config;
+  config.timing = timing;
   config.solver = solver_of(state);
   int observations = 0;
   for ([[maybe_unused]] auto _ : state) observations = estimator::estimate(s.measurements, config).summary.observations;
   state.counters["observations"] = observations;
 }
-BENCHMARK(batch_solve)->ArgName("ceres")->Arg(0)->Arg(1)->Unit(benchmark::kSecond)->Iterations(3);
+BENCHMARK_CAPTURE(batch_solve, propagated, estimator::TimingModel::kPropagated)
+    ->ArgName("ceres")
+    ->Arg(0)
+    ->Arg(1)
+    ->Unit(benchmark::kSecond)
+    ->Iterations(3);
+BENCHMARK_CAPTURE(batch_solve, spline, estimator::TimingModel::kSpline)
+    ->ArgName("ceres")
+    ->Arg(0)
+    ->Arg(1)
+    ->Unit(benchmark::kSecond)
+    ->Iterations(3);
 
 // A window of 10 keyframes and 40 kept points that moves over the same 15 s: what a keyframe takes, and in which parts.
 void window(benchmark::State& state) {

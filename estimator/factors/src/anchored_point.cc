@@ -111,7 +111,7 @@ bool PropagatedSight::see(const Viewpoint& from, PointChain& chain, bool differe
   sighting.dr_dq = view.with_row(dr_dq);
   sighting.T_W_Bj = view.body;
   const ObserverJacobians J(sighting.dr_dq, from.T_B_C, view.body);
-  sighting.state = path.chain_to_state<2>(view.body, J.position(chain), J.rotation(chain));
+  sighting.state = path.chain_to_state<2>(J.position(chain), J.rotation(chain));
   sighting.td = sighting.dr_dq * view.q_dot;
   sighting.readout = view.phase * sighting.td;
   return true;

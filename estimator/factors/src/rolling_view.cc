@@ -6,8 +6,9 @@
 
 namespace plumbline::estimator {
 
+template <class Path>
 bool view_point(const core::PinholeCamera& camera, const RollingShutter& shutter, const RigidMotion& T_B_C,
-                double first_row_px, BodyPath& path, PointChain& chain, RollingView& result) {
+                double first_row_px, Path& path, PointChain& chain, RollingView& result) {
   constexpr int kMaxIterations = 10;
   // A defect below this is made up for along q' only: what that neglects is of second order in the ray, and of relative
   // order 1e-11 in the derivatives.
@@ -23,7 +24,7 @@ bool view_point(const core::PinholeCamera& camera, const RollingShutter& shutter
     const auto pixel = camera.project(chain.q, &J_pixel);
     if (!pixel) return false;
     const TimedBody& body = result.body;
-    const Eigen::Vector3d X_dot = chain.X.cross(body.local.omega) - chain.lambda * (body.R.transpose() * body.velocity);
+    const Eigen::Vector3d X_dot = chain.X.cross(body.omega) - chain.lambda * (body.R.transpose() * body.velocity);
     result.q_dot.noalias() = T_B_C.R.transpose() * X_dot;
     result.dv_dq = J_pixel.row(1);
     result.slope = 1.0 - result.dv_dq.dot(result.q_dot) * result.s_per_row;
@@ -38,5 +39,10 @@ bool view_point(const core::PinholeCamera& camera, const RollingShutter& shutter
   }
   return false;
 }
+
+template bool view_point(const core::PinholeCamera&, const RollingShutter&, const RigidMotion&, double, BodyPath&,
+                         PointChain&, RollingView&);
+template bool view_point(const core::PinholeCamera&, const RollingShutter&, const RigidMotion&, double, SplinePath&,
+                         PointChain&, RollingView&);
 
 }  // namespace plumbline::estimator

@@ -21,7 +21,7 @@ std::optional<WorldPointView> observe_world_point(const CameraModel& model, cons
     const Matrix23 J_q = seen.with_row(J_pixel / model.pixel_sigma_px);
     const Matrix23 J_X = J_q * T_B_C.R.transpose();
     const Matrix23 J_W = J_X * seen.body.R.transpose();
-    jacobians->state = path.chain_to_state<2>(seen.body, -J_W, times_skew(J_X, chain.X));
+    jacobians->state = path.chain_to_state<2>(-J_W, times_skew(J_X, chain.X));
     jacobians->extrinsics << -J_X, times_skew(J_q, chain.q);
     jacobians->td = J_q * seen.q_dot;
     jacobians->readout = seen.phase * jacobians->td;

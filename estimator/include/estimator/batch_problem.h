@@ -45,6 +45,9 @@ class BatchProblem {
   // Of calibration and last state, at the present values.
   std::optional<core::PosteriorCovariance> covariance();
 
+  // At the present values; nothing where the trajectory is not a spline.
+  std::optional<core::KnotCheck> knot_check() const;
+
   // The tracks of lines that an observed end is further from than so many sigmas, at the present values.
   std::vector<std::size_t> lines_beyond(double sigmas) const;
 
@@ -71,10 +74,25 @@ class BatchProblem {
   void add_lines(const Timings& timings);
   bool add_line(const LineModel& model, const Timings& timings, std::size_t track, LineValue& line);
 
+  // Of a trajectory spline, whose timings count from its origin.
+  void add_spline_blocks();
+  std::vector<int> blocks_at(const SplineInstant& at) const;
+  Term spline_term(std::unique_ptr<SplineVisual> factor) const;
+  Term spline_point(const PointModel& model, const Timings& timings, const TrackObservation& anchor,
+                    const TrackObservation& observer) const;
+  Term spline_line(const LineModel& model, const Timings& timings, const LineTrackObservation& o,
+                   const Eigen::Vector3d& origin_W) const;
+  void add_spline_inertial_factors();
+  core::State state_on_spline(core::TimeNs t_ns) const;
+  Eigen::MatrixXd newest_state_by_columns(const SchurSystem& system, int calibration) const;
+
   const BatchInput& input_;
   SolvePhase phase_;
   BatchValues start_;
   std::vector<StateBlock> states_;
+  std::optional<TrajectorySpline> spline_;  // in place of the states
+  std::vector<int> control_blocks_;
+  std::vector<int> bias_blocks_;
   PoseBlock extrinsics_;
   double td_s_;
   double readout_s_;

@@ -12,6 +12,8 @@
 #include "core/state.h"
 #include "estimator/config.h"
 #include "estimator/factors/orthonormal_line.h"
+#include "estimator/factors/parameter_blocks.h"
+#include "estimator/factors/spline_factors.h"
 #include "estimator/keyframes.h"
 
 namespace plumbline::estimator {
@@ -32,6 +34,21 @@ struct LineValue {
   LineBlock block;
 };
 
+// The unknowns of camera timing `spline` (trajectory_spline.h).
+struct TrajectorySpline {
+  SplineKnots knots;
+  std::size_t first_sample = 0;  // of the IMU, at the spline's origin
+  std::size_t last_sample = 0;   // at its end
+  std::vector<PoseBlock> controls = {};
+  double bias_interval_s = 0.0;
+  std::vector<BiasBlock> biases = {};
+
+  SplineInstant at(const core::MeasurementLog& log, core::TimeNs t_ns) const;
+  double seconds(const core::MeasurementLog& log, core::TimeNs t_ns) const {
+    return core::to_seconds(t_ns - log.imu[first_sample].t_ns);
+  }
+};
+
 // State 0 is the prior's, state k + 1 that of keyframe k.
 struct BatchValues {
   core::RigCalibration calibration;
@@ -40,6 +57,7 @@ struct BatchValues {
   std::vector<std::optional<Eigen::Vector3d>> landmarks;  // (x, y, lambda) a track
   std::vector<std::optional<LineValue>> lines = {};       // a line track
   std::vector<bool> culled_lines = {};                    // line tracks that have been given up
+  std::optional<TrajectorySpline> spline = std::nullopt;  // where it is what is estimated; the states are on it
 
   void forget_landmarks();
 };

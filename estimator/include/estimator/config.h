@@ -16,8 +16,8 @@ namespace plumbline::estimator {
 
 enum class EstimatorType { kBatch, kSlidingWindow, kExternal };
 inline constexpr std::array<std::string_view, 3> kEstimatorTypeNames = {"batch", "sliding_window", "external"};
-enum class TimingModel { kPropagated, kFeatureVelocity };
-inline constexpr std::array<std::string_view, 2> kTimingModelNames = {"propagated", "feature_velocity"};
+enum class TimingModel { kPropagated, kFeatureVelocity, kSpline };
+inline constexpr std::array<std::string_view, 3> kTimingModelNames = {"propagated", "feature_velocity", "spline"};
 enum class Initialisation { kPrior };
 inline constexpr std::array<std::string_view, 1> kInitialisationNames = {"prior"};
 enum class Solver { kSchur, kCeres };
@@ -51,6 +51,12 @@ struct EstimateWhat {
 struct LineRules {
   double largest_depth_sigma = 0.3;
   double cull_sigma = 8.0;
+};
+
+// Of the timing `spline`.
+struct SplineConfig {
+  std::optional<double> knot_interval_s;
+  int order = 6;
 };
 
 // Of `sliding_window`.
@@ -92,6 +98,7 @@ struct EstimatorConfig {
   ImuNoiseOverride imu;
   EstimateWhat estimate;
   LineRules lines;
+  SplineConfig spline;
   WindowConfig window;
   ExternalConfig external;
   int max_iterations = 50;

@@ -12,6 +12,7 @@
 #include <ceres/manifold.h>
 
 #include "core/estimate.h"
+#include "estimator/factors/spline_path.h"
 #include "estimator/marginal_prior.h"
 
 namespace plumbline::estimator {
@@ -29,7 +30,7 @@ struct ParameterBlock {
   double share_of_information = 0.0;
 };
 
-inline constexpr int kMostBlocks = 7;  // of a term
+inline constexpr int kMostBlocks = 2 * kMostControls + 4;  // of a term: a point seen from a spline
 
 struct ResidualTerm {
   const ceres::CostFunction* factor = nullptr;
@@ -38,9 +39,11 @@ struct ResidualTerm {
   const ceres::LossFunction* loss = nullptr;
 };
 
-// Blocks that are not eliminated come in the order of their columns; terms of an eliminated block stand together.
+// Blocks that are not eliminated come in the order of their columns, those that all terms may share (the calibration)
+// last; terms of an eliminated block stand together.
 struct LeastSquares {
   std::vector<ParameterBlock> blocks;
+  int first_shared = 0;
   std::vector<ResidualTerm> terms;
   const MarginalPrior* prior = nullptr;
   std::vector<int> prior_blocks;  // of its parts

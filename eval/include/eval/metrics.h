@@ -31,6 +31,8 @@
 //                         The three only where lines were used, the first two only where one was estimated.
 //   kappa2                of the bound, see eval/cramer_rao.h; only with eval.crlb
 //   restarts              how often the estimator began anew after a failure; only where it may
+//   knot_interval_s       of a trajectory spline; only with estimator.timing: spline
+//   knot_excess           likewise: how far the IMU's residuals exceed their noise, in sigmas (core::KnotCheck)
 //   td_convergence_s      since the first estimated state: the first instant after which |td error| stays within
 //                         eval.td_bound_s for the rest; only where the estimator keeps a history of td
 // A joint block's units do not mix in a norm, so its value is that of the position in it.
@@ -68,7 +70,7 @@ inline constexpr std::string_view kLineAngle = "line_angle_deg";
 inline constexpr std::string_view kLineDistance = "line_distance_m";
 inline constexpr std::string_view kLineShare = "line_share";
 
-inline constexpr std::array<MetricInfo, 29> kMetrics = {{
+inline constexpr std::array<MetricInfo, 31> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
@@ -96,6 +98,8 @@ inline constexpr std::array<MetricInfo, 29> kMetrics = {{
     {kLineDistance, "line distance [mm]", 1e3},
     {kLineShare, "lines estimated, share", 1.0, false, false},
     {"restarts", "restarts a trial", 1.0, false, false},
+    {"knot_interval_s", "interval of knots [s]", 1.0, false, false},
+    {"knot_excess", "IMU residuals over noise [sigma]", 1.0, false, false},
     {kTdConvergence, "td convergence [s]", 1.0, false, false},
     {kKappa2, "kappa2 of the bound", 1.0, false, false},
 }};

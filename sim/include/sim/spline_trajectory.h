@@ -1,13 +1,13 @@
 // Quintic (C^4) uniform B-spline: positions in R^3, orientations as a cumulative B-spline on
 // SO(3).
 //   p(t) = sum_j B_j(u) p_{i+j}            R(t) = R_i prod_{j=1..5} Exp(lambda_j(u) Log(R_{i+j-1}^T R_{i+j}))
-// Sommer, Usenko, Schubert, Demmel, Cremers, "Efficient derivative computation for cumulative B-splines on Lie
-// groups", CVPR 2020 (rates and accelerations by the recursions of section 4).
+// (core/rotation_spline.h)
 #pragma once
 
 #include <array>
 #include <vector>
 
+#include "core/bspline_basis.h"
 #include "sim/trajectory.h"
 
 namespace plumbline::sim {
@@ -18,10 +18,10 @@ class SplineTrajectory final : public Trajectory {
   SplineTrajectory(const std::vector<core::Pose>& controls, double knot_interval_s);
 
   Kinematics at(double t_s) const override;
-  core::Pose pose_at(double t_s) const override;
   double end_s() const { return static_cast<double>(positions_.size() - 5) * knot_interval_s_; }
 
  private:
+  static constexpr int kOrder = core::bspline::kMostOrder;
   struct Segment {
     std::size_t first;  // control
     double u;           // in [0, 1]

@@ -6,18 +6,10 @@
 //     b_k(td) = b_k - (td - td_k + (row_k - rows/2)/rows readout) v_k,   dr_k/dtd = -(n_c.v_k)/m
 //     row_k the observed row, v_k the velocity of the end point on the normalised plane, td_k the td with which the
 //     state's time was formed. Of v only the part across the line counts.
-//   PropagatedLineFactor   the same blocks; camera timing `propagated`:
-//     an end point of row v is exposed at s_k + tau(v), tau(v) = (t_cam,k - s_k) + td + (v - rows/2)/rows readout, and
-//     sees the line from the body's pose then (local_motion.h). All that the line may be seen at is the curve
-//       F(u, v) = n_c(tau(v)) . b(u, v) = 0
-//     and r is the signed distance of the observed end point from it: along grad F, at the foot of the perpendicular.
+//   PropagatedLineFactor   the same blocks; camera timing `propagated`: the law of timed_line.h, the body carried by
+//   the
+//     IMU from the state (timed_body.h)
 //
-// The row of `propagated` is that of the foot, not the observed one. What of the pixel's noise lies across the curve
-// is the residual; were it in the time as well, it would be in the derivatives by td and readout, correlated with the
-// residual, and bias both. The noise along the curve cannot be told from the unknown place of the end on the line, and
-// is independent of the residual. Since r is a distance along the normal of the true curve (the chord's normal turned
-// by the flow), it has the pixel's variance exactly to first order. And by the envelope theorem
-//   dr/dx = (dF/dx at the foot, held fixed) / |grad F|,   grad F = D^T n_c,xy + (0, dF/dtau readout/rows)
 // With no readout this is CameraLineFactor at the pose at tau; at r = 0 and no motion all three agree.
 //
 // A factor is false (Ceres rejects the step) where n or d of the line vanishes, the image is at infinity, a time leaves
@@ -32,7 +24,7 @@
 #include "estimator/factors/line_residual.h"
 #include "estimator/factors/orthonormal_line.h"
 #include "estimator/factors/parameter_blocks.h"
-#include "estimator/factors/point_factors.h"
+#include "estimator/factors/timed_line.h"
 
 namespace plumbline::estimator {
 
@@ -70,7 +62,8 @@ class VelocityLineFactor final : public ceres::SizedCostFunction<2, kStateSize, 
 class PropagatedLineFactor final : public ceres::SizedCostFunction<2, kStateSize, kPoseSize, 1, 1, kLineSize> {
  public:
   PropagatedLineFactor(const CameraModel& model, FrameTiming frame, const Eigen::Vector3d& origin_W,
-                       const SegmentPixels& observed);
+                       const SegmentPixels& observed)
+      : law_(model, origin_W, observed), gravity_m_s2_(model.gravity_m_s2), frame_(std::move(frame)) {}
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
@@ -78,10 +71,9 @@ class PropagatedLineFactor final : public ceres::SizedCostFunction<2, kStateSize
   std::optional<SegmentPixels> feet(double const* const* parameters) const;
 
  private:
-  CameraModel model_;
+  TimedLine law_;
+  double gravity_m_s2_;
   FrameTiming frame_;
-  Eigen::Vector3d origin_W_;
-  std::array<LineEndPoint, 2> ends_;
 };
 
 }  // namespace plumbline::estimator

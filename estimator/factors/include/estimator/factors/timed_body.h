@@ -20,36 +20,32 @@ struct FrameTiming {
   double offset_s = 0.0;                      // t_cam,k - s_k, so that a row is exposed at s_k + offset + td + ...
 };
 
-// R_W_B(tau), p_W_B(tau) and the rates.
+// T_W_B at an instant and its rates, whatever carries the body there.
 struct TimedBody : RigidMotion {
-  LocalPose local;
-  Eigen::Vector3d velocity;  // dp/dtau
+  Eigen::Vector3d velocity;  // dp/dt
+  Eigen::Vector3d omega;     // dR/dt = R [omega]x
 };
 
-// False where tau_s leaves the range of the local motion.
-bool body_at(const LocalMotion& motion, const core::State& state, double gravity_m_s2, double tau_s, TimedBody& body,
-             LocalPoseJacobians* jacobians = nullptr);
-
-// The same for many times and for derivatives of few rows: remembers the step of the last time.
+// Poses of one state at many times, and their derivatives: remembers the last step and the last pose.
 class BodyPath {
  public:
   BodyPath(const LocalMotion& motion, const core::State& state, double gravity_m_s2)
       : motion_(motion), state_(state), R_k_(state.T_W_B.q.toRotationMatrix()), gravity_W_(0.0, 0.0, -gravity_m_s2) {}
 
+  // False where tau_s leaves the range of the local motion.
   bool at(double tau_s, TimedBody& body);
 
   // From the derivatives with respect to the body at the last time to those with respect to the state.
   template <int kRows>
-  Eigen::Matrix<double, kRows, core::kStateDof> chain_to_state(const TimedBody& body,
-                                                               const Eigen::Matrix<double, kRows, 3>& J_p,
+  Eigen::Matrix<double, kRows, core::kStateDof> chain_to_state(const Eigen::Matrix<double, kRows, 3>& J_p,
                                                                const Eigen::Matrix<double, kRows, 3>& J_theta) const {
     using Rows = Eigen::Matrix<double, kRows, 3>;
     const Rows J_p_body = J_p * R_k_;
-    const auto bias = step_.pull_back<kRows>(tau_s_, body.local, J_p_body, J_theta);
+    const auto bias = step_.pull_back<kRows>(tau_s_, local_, J_p_body, J_theta);
     Eigen::Matrix<double, kRows, core::kStateDof> J;
     J.template middleCols<3>(core::kPosition) = J_p;
-    J.template middleCols<3>(core::kOrientation) = -times_skew(J_p_body, body.local.p);
-    J.template middleCols<3>(core::kOrientation).noalias() += J_theta * body.local.R.transpose();
+    J.template middleCols<3>(core::kOrientation) = -times_skew(J_p_body, local_.p);
+    J.template middleCols<3>(core::kOrientation).noalias() += J_theta * local_.R.transpose();
     J.template middleCols<3>(core::kVelocity) = tau_s_ * J_p;
     J.template middleCols<3>(core::kGyroBias) = bias.b_g;
     J.template middleCols<3>(core::kAccelBias) = bias.b_a;
@@ -62,6 +58,7 @@ class BodyPath {
   Eigen::Matrix3d R_k_;
   Eigen::Vector3d gravity_W_;
   LocalStep step_;
+  LocalPose local_;
   double tau_s_ = 0.0;
   bool found_ = false;
 };
