@@ -108,7 +108,7 @@ void conclude(const BatchInput& input, BatchProblem& problem, bool too_coarse, c
   if (result.summary.observations == 0) {
     result.status = core::SolveStatus::kFailedInitialisation;
     result.reason = "no observation could be used";
-  } else if (too_coarse) {
+  } else if (too_coarse && result.knots) {
     result.status = core::SolveStatus::kKnotsTooCoarse;
     result.reason = fmt::format("knots {:.3g} s apart: the IMU's residuals exceed its noise by {:.3g} sigma",
                                 result.knots->interval_s, result.knots->excess_sigmas);

@@ -40,14 +40,14 @@ SplineKnots knots_over(double length_s, double interval_s, int order) {
 // What is left of the six channels when each is fitted by a spline, in sums of squares over the samples' variances;
 // rates by one order less than the poses', accelerations by two.
 struct ChannelFit {
-  std::array<double, 6> squares;
-  int coefficients;  // of a rate
+  std::vector<double> squares;
+  int coefficients = 0;  // of a rate
 };
 ChannelFit fit_channels(const BatchInput& input, const SampleRange& range, double interval_s) {
   const std::vector<core::ImuSample>& imu = input.log.imu;
   const double length_s = seconds_between(input, range.first, range.last);
   const double dt_s = length_s / static_cast<double>(range.last - range.first);
-  ChannelFit fit{};
+  ChannelFit fit;
   for (const int derivative : {1, 2}) {
     const SplineKnots knots = knots_over(length_s, interval_s, input.config.spline.order - derivative);
     const int n = knots.controls();
@@ -79,7 +79,7 @@ ChannelFit fit_channels(const BatchInput& input, const SampleRange& range, doubl
     for (int c = 0; c < 3; ++c) {
       Eigen::VectorXd x = sums.col(c);
       normal.solve_lower(x);
-      fit.squares[static_cast<std::size_t>(3 * (derivative - 1) + c)] = squares[c] - x.squaredNorm();
+      fit.squares.push_back(squares[c] - x.squaredNorm());
     }
     if (derivative == 1) fit.coefficients = n;
   }
@@ -91,7 +91,7 @@ core::Pose pose_at(const BatchInput& input, const BatchValues& values, double t_
   const std::vector<core::ImuSample>& imu = input.log.imu;
   const std::size_t sample = nearest_sample(imu, t_s, origin_ns);
   const auto after = std::lower_bound(values.samples.begin(), values.samples.end(), sample);
-  std::size_t k = static_cast<std::size_t>(after - values.samples.begin());
+  auto k = static_cast<std::size_t>(after - values.samples.begin());
   if (k == values.samples.size() || (k > 0 && sample - values.samples[k - 1] < values.samples[k] - sample)) --k;
   const core::State state = carry(values.states[k], imu, values.samples[k], sample, input.log.gravity_m_s2);
   const double rest_s = t_s - core::to_seconds(imu[sample].t_ns - origin_ns);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
+#include <stdexcept>
 
 #include "estimator/factors/parameter_blocks.h"
 
@@ -55,9 +57,8 @@ SegmentPair::SegmentPair(const SplineKnots& knots, const std::array<int, 2>& of)
 
 std::vector<int> SegmentPair::controls() const {
   std::vector<int> result(static_cast<std::size_t>(size));
-  for (std::size_t k = 0; k < 2; ++k) {
-    for (int j = 0; j < order; ++j) result[static_cast<std::size_t>(from[k] + j)] = segments[k] + j;
-  }
+  for (std::size_t k = 0; k < 2; ++k)
+    std::iota(result.begin() + from[k], result.begin() + from[k] + order, segments[k]);
   return result;
 }
 

@@ -23,8 +23,9 @@ SplinePath::SplinePath(const SplineKnots& knots, int segment, double const* cons
       order_(knots.order),
       segment_(segment),
       rotation_(knots.order, rotation(controls[0]), steps(knots.order, controls)) {
-  for (int j = 0; j < order_; ++j)
-    positions_[static_cast<std::size_t>(j)] = Eigen::Map<const Eigen::Vector3d>(controls[j]);
+  for (std::size_t j = 0; j < static_cast<std::size_t>(order_); ++j) {
+    positions_[j] = Eigen::Map<const Eigen::Vector3d>(controls[j]);
+  }
 }
 
 bool SplinePath::at(double t_s, TimedBody& body) {

@@ -81,13 +81,16 @@ void TimedPoint<kLandmark>::write_shared(const TimedPointJacobians& J, const Tim
 
 template class TimedPoint<LandmarkType::kBearingInverseDepth>;
 template class TimedPoint<LandmarkType::kFixedBearing>;
-#define PLUMBLINE_SEE_BY(Path, kLandmark)                                                                \
-  template bool TimedPoint<kLandmark>::see(const TimedRig&, const double*, Path&, double, Path&, double, \
-                                           Eigen::Vector2d&, TimedPointJacobians*) const
-PLUMBLINE_SEE_BY(BodyPath, LandmarkType::kBearingInverseDepth);
-PLUMBLINE_SEE_BY(BodyPath, LandmarkType::kFixedBearing);
-PLUMBLINE_SEE_BY(SplinePath, LandmarkType::kBearingInverseDepth);
-PLUMBLINE_SEE_BY(SplinePath, LandmarkType::kFixedBearing);
-#undef PLUMBLINE_SEE_BY
+template bool TimedPoint<LandmarkType::kBearingInverseDepth>::see(const TimedRig&, const double*, BodyPath&, double,
+                                                                  BodyPath&, double, Eigen::Vector2d&,
+                                                                  TimedPointJacobians*) const;
+template bool TimedPoint<LandmarkType::kFixedBearing>::see(const TimedRig&, const double*, BodyPath&, double, BodyPath&,
+                                                           double, Eigen::Vector2d&, TimedPointJacobians*) const;
+template bool TimedPoint<LandmarkType::kBearingInverseDepth>::see(const TimedRig&, const double*, SplinePath&, double,
+                                                                  SplinePath&, double, Eigen::Vector2d&,
+                                                                  TimedPointJacobians*) const;
+template bool TimedPoint<LandmarkType::kFixedBearing>::see(const TimedRig&, const double*, SplinePath&, double,
+                                                           SplinePath&, double, Eigen::Vector2d&,
+                                                           TimedPointJacobians*) const;
 
 }  // namespace plumbline::estimator
