@@ -100,7 +100,7 @@ void BorderedBand::solve_upper(Eigen::VectorXd& x) const {
   auto tail = x.tail(border());
   border_.rightCols(border()).triangularView<Eigen::Lower>().adjoint().solveInPlace(tail);
   x.head(banded_).noalias() -= border_.leftCols(banded_).transpose() * tail;
-  for (int j = (banded_ - 1) / kPanel * kPanel; j >= 0; j -= kPanel) {
+  for (int j = (banded_ + kPanel - 1) / kPanel * kPanel - kPanel; j >= 0; j -= kPanel) {
     const int n = std::min(kPanel, banded_ - j);
     auto head = x.segment(j, n);
     head.noalias() -= block(j + n, j, below(j), n).transpose() * x.segment(j + n, below(j));

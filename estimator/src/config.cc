@@ -64,6 +64,17 @@ static void visit(core::ConfigVisitor& v, WindowConfig& c) {
       "`restarts` counts them");
 }
 
+static void visit(core::ConfigVisitor& v, FromScratchConfig& c) {
+  v.value("longest_s", c.longest_s, core::between(0.5, 60.0), "of the newest pictures, those that it is made from");
+  v.value("least_parallax_px", c.least_parallax_px, core::positive(),
+          "between two of them, the best rotation taken out (median)");
+  v.value("largest_scale_sigma", c.largest_scale_sigma, core::between(1e-4, 0.3),
+          "it waits for more data while the scale is known worse than this share of itself");
+  v.value("gyro_bias_sigma_rad_s", c.gyro_bias_sigma_rad_s, sigma_up_to(core::kMostRateRadS),
+          "what is known of the bias beforehand: zero, give or take this");
+  v.value("accel_bias_sigma_m_s2", c.accel_bias_sigma_m_s2, sigma_up_to(core::kMostAccelerationMS2), "likewise");
+}
+
 static void visit(core::ConfigVisitor& v, ExternalConfig& c) {
   v.path("command", c.command, "the program; what is in its file is part of what the runs are");
   v.value("arguments", c.arguments, "words between blanks, before `--dataset DIR --out DIR`");
@@ -74,10 +85,9 @@ static void visit(core::ConfigVisitor& v, ExternalConfig& c) {
 }
 
 void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
-  v.choice(
-      "type", c.type, kEstimatorTypeNames,
-      "`batch`: full maximum a posteriori; `sliding_window`: online, each state from the data up to it; `external`: "
-      "another program");
+  v.choice("type", c.type, kEstimatorTypeNames,
+           "`batch`: full maximum a posteriori; `sliding_window`: online, each state from the data up to it; "
+           "`initialisation`: that of `from_scratch` alone; `external`: another program");
   v.choice("use", c.use, kObservationUseNames, "which observations enter");
   v.choice(
       "timing", c.timing, kTimingModelNames,
@@ -89,7 +99,10 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.choice("landmark", c.landmark, kLandmarkTypeNames,
            "`bearing_inverse_depth`: 3 dof; `fixed_bearing`: inverse depth only, the anchor's observation taken as "
            "exact, for comparison");
-  v.choice("initialisation", c.initialisation, kInitialisationNames, "`prior`: starts from the scenario's prior");
+  v.choice(
+      "initialisation", c.initialisation, kInitialisationNames,
+      "`prior`: starts from the scenario's prior; `from_scratch`: takes of it what it says of the calibration, and "
+      "finds the first states itself");
   v.choice("solver", c.solver, kSolverNames, "`schur`: our own normal equations; `ceres`: the reference, slower");
   v.value("keyframe_rate_hz", c.keyframe_rate_hz, core::positive_up_to(core::kMostFrequencyHz),
           "only keyframes' observations enter");
@@ -106,6 +119,7 @@ void visit(core::ConfigVisitor& v, EstimatorConfig& c) {
   v.section("lines", c.lines, "which lines are estimated");
   v.section("spline", c.spline, "of the timing `spline`");
   v.section("window", c.window, "of `sliding_window`");
+  v.section("from_scratch", c.from_scratch, "of `initialisation: from_scratch`");
   v.section("external", c.external, "of `external`");
   v.value("max_iterations", c.max_iterations, core::at_least(1), "of each solve; reaching it is a failed trial");
   v.value("max_cost_per_dof", c.max_cost_per_dof, core::positive(),

@@ -11,6 +11,9 @@
 #include "core/error.h"
 #include "core/physical_ranges.h"
 #include "estimator/batch.h"
+#include "estimator/batch_start.h"
+#include "estimator/factors/imu_increment.h"
+#include "estimator/from_scratch.h"
 #include "estimator/sliding_window.h"
 
 namespace plumbline::estimator {
@@ -40,6 +43,40 @@ std::optional<std::string> gap_in_imu(const std::vector<core::ImuSample>& imu) {
   return std::nullopt;
 }
 
+core::EstimateLog estimate_from_prior(const core::MeasurementLog& log, const EstimatorConfig& config,
+                                      std::size_t first_frame = 0) {
+  switch (config.type) {
+    case EstimatorType::kBatch:
+      return estimate_batch(log, config);
+    case EstimatorType::kSlidingWindow:
+      return estimate_in_window(log, config, first_frame);
+    case EstimatorType::kInitialisation:
+    case EstimatorType::kExternal:
+      break;  // neither is from a prior, the one because it has none, the other because it is not ours
+  }
+  throw std::logic_error("estimate: unknown type");
+}
+
+// The batch's first state is the recording's.
+void carry_to_the_first_sample(const core::MeasurementLog& log, core::InitialPrior& prior) {
+  const std::size_t sample = nearest_sample(log.imu, 0.0, prior.t_ns);
+  prior.start = carry(prior.start, log.imu, sample, 0, log.gravity_m_s2);
+  prior.mean.T_W_B = prior.start.T_W_B;
+  prior.mean.v_W = prior.start.v_W;
+  prior.t_ns = log.imu.front().t_ns;
+}
+
+core::EstimateLog estimate_from_scratch(const core::MeasurementLog& log, const EstimatorConfig& config) {
+  FromScratch scratch = initialise_from_scratch(log, config);
+  if (!scratch.found || config.type == EstimatorType::kInitialisation) return std::move(scratch.log);
+  core::MeasurementLog begun = log;
+  begun.prior = scratch.prior;
+  if (config.type == EstimatorType::kBatch) carry_to_the_first_sample(log, begun.prior);
+  core::EstimateLog estimate = estimate_from_prior(begun, config, scratch.newest_frame);
+  estimate.initialisation = std::move(scratch.log.initialisation);
+  return estimate;
+}
+
 }  // namespace
 
 void require_usable(const EstimatorConfig& config, const BelievedNoise& noise, const core::CalibrationSigmas& sigma,
@@ -55,6 +92,9 @@ void require_usable(const EstimatorConfig& config, const BelievedNoise& noise, c
   require_weight(noise.imu.gyro_bias_walk, "estimator.imu.gyro_bias_walk_rad_s2_sqrt_hz", fallback);
   require_weight(noise.imu.accel_noise_density, "estimator.imu.accel_noise_density_m_s2_sqrt_hz", fallback);
   require_weight(noise.imu.accel_bias_walk, "estimator.imu.accel_bias_walk_m_s3_sqrt_hz", fallback);
+  if (starts_from_scratch(config) && !uses_points(config.use)) {
+    throw core::RuleError({"estimator.use", "must have points where the estimator starts from scratch"});
+  }
   const std::string_view width = "a free parameter needs a prior with a width, which";
   if (free.td) require_weight(sigma.td_s, "scenario.prior.td_sigma_s", width);
   if (free.readout) require_weight(sigma.readout_s, "scenario.prior.readout_sigma_s", width);
@@ -87,15 +127,7 @@ core::EstimateLog estimate(const core::MeasurementLog& log, const EstimatorConfi
     failed.reason = std::move(*reason);
     return failed;
   }
-  switch (config.type) {
-    case EstimatorType::kBatch:
-      return estimate_batch(log, config);
-    case EstimatorType::kSlidingWindow:
-      return estimate_in_window(log, config);
-    case EstimatorType::kExternal:
-      break;  // not ours
-  }
-  throw std::logic_error("estimate: unknown type");
+  return starts_from_scratch(config) ? estimate_from_scratch(log, config) : estimate_from_prior(log, config);
 }
 
 }  // namespace plumbline::estimator

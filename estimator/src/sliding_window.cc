@@ -10,12 +10,10 @@
 #include <fmt/format.h>
 
 #include "estimator/window.h"
+#include "estimator/window_settle.h"
 
 namespace plumbline::estimator {
 namespace {
-
-// The states are timed anew when td has moved further than this from the td that placed them.
-constexpr double kRetimeS = 5e-3;
 
 // Named causes of failure.
 struct Failure {
@@ -25,7 +23,8 @@ struct Failure {
 
 class OnlineEstimate {
  public:
-  OnlineEstimate(const core::MeasurementLog& log, const EstimatorConfig& config) : log_(log), config_(config) {
+  OnlineEstimate(const core::MeasurementLog& log, const EstimatorConfig& config, std::size_t first_frame)
+      : log_(log), config_(config), first_frame_(first_frame) {
     window_.emplace(log, config);
     if (config.window.restarts > 0) result_.restarts = 0;
     result_.td_estimated = config.estimate.td;
@@ -54,7 +53,7 @@ class OnlineEstimate {
  private:
   std::optional<Failure> advance(std::size_t frame) {
     try {
-      if (!window_->add_frame(frame)) return std::nullopt;
+      if (!window_->add_frame(frame) || frame < first_frame_) return std::nullopt;
       return step();
     } catch (const std::domain_error& error) {
       return Failure{core::SolveStatus::kDiverged, error.what()};
@@ -91,35 +90,16 @@ class OnlineEstimate {
 
   std::optional<Failure> step() {
     const core::TimeNs t_ns = log_.imu[window_->newest().sample].t_ns;
-    window_->triangulate();
-    std::optional<WindowSolution> solution;
-    WindowFit fit;
-    int outliers = 0;
-    // Where td and the depths are still to be found, a wrong match would be taken for motion.
-    if (!window_->folded()) {
-      window_->solve(true);
-      outliers += window_->assess(true).outliers;
-    }
-    constexpr int kMaxRounds = 4;
-    for (int round = 0; round < kMaxRounds; ++round) {
-      solution = window_->solve();
-      result_.summary.iterations += solution->result.iterations;
-      if (solution->result.status == core::SolveStatus::kDiverged) break;
-      if (must_retime()) {
-        window_->retime(window_->calibration().td_s);
-        continue;
-      }
-      fit = window_->assess(round + 1 < kMaxRounds);
-      outliers += fit.outliers;
-      if (fit.outliers == 0) break;
-    }
-    if (solution->result.status == core::SolveStatus::kDiverged || !solution->covariance) {
+    const SettledWindow settled = settle(*window_, config_);
+    result_.summary.iterations += settled.iterations;
+    const WindowSolution& solution = settled.solution;
+    if (solution.result.status == core::SolveStatus::kDiverged || !solution.covariance) {
       return Failure{core::SolveStatus::kDiverged,
                      fmt::format("the window of the keyframe at {} ns could not be solved", t_ns)};
     }
-    if (auto failure = watch(t_ns, *solution, fit, outliers)) return failure;
-    summarise(*solution, fit);
-    covariance_ = *solution->covariance;
+    if (auto failure = watch(t_ns, settled)) return failure;
+    summarise(solution, settled.fit);
+    covariance_ = *solution.covariance;
     record(t_ns);
     if (unsolved_ == 0 && misfits_ == 0 && rejections_ == 0) sound_ = as_prior(t_ns);
     newest_stays_ =
@@ -127,21 +107,29 @@ class OnlineEstimate {
     if (!newest_stays_) return std::nullopt;
     const bool td_is_known =
         !config_.estimate.td || std::sqrt(covariance_(core::kCovTd, core::kCovTd)) < config_.window.freeze_td_sigma_s;
-    const int most = td_is_known || window_->folded() ? config_.window.keyframes : config_.window.start_keyframes;
+    const int most = window_->folded() || (td_is_known && scale_is_known()) ? config_.window.keyframes
+                                                                            : config_.window.start_keyframes;
     while (window_->size() > static_cast<std::size_t>(std::max(most, config_.window.keyframes))) window_->fold_oldest();
     return std::nullopt;
+  }
+
+  // What leaves is linearised for good, so that a scale that is a few percent off would stay so. The prior tells it,
+  // but where the estimate began from scratch.
+  bool scale_is_known() {
+    constexpr double kKnown = 0.01;
+    return first_frame_ == 0 || window_->relative_scale_sigma().value_or(1.0) < kKnown;
   }
 
   // Once is an accident, so many keyframes in a row are not.
   static constexpr int kPatience = 10;
 
   // What an estimate that has gone astray shows.
-  std::optional<Failure> watch(core::TimeNs t_ns, const WindowSolution& solution, const WindowFit& fit, int outliers) {
+  std::optional<Failure> watch(core::TimeNs t_ns, const SettledWindow& settled) {
     const auto count = [](int& in_a_row, bool bad) { in_a_row = bad ? in_a_row + 1 : 0; };
-    const double squares_per_residual = fit.visual.residuals > 0 ? fit.visual.squares / fit.visual.residuals : 0.0;
-    count(unsolved_, solution.result.status == core::SolveStatus::kIterationLimit);
+    const double squares_per_residual = settled.fit.squares_per_residual();
+    count(unsolved_, settled.solution.result.status == core::SolveStatus::kIterationLimit);
     count(misfits_, squares_per_residual > config_.max_cost_per_dof);
-    count(rejections_, 2 * outliers > window_->observations_of_newest());
+    count(rejections_, 2 * settled.outliers > window_->observations_of_newest());
     const std::string since = fmt::format("of {} keyframes in a row up to {} ns", kPatience, t_ns);
     if (unsolved_ >= kPatience && window_->folded()) {
       return Failure{
@@ -169,11 +157,6 @@ class OnlineEstimate {
     summary.visual = fit.visual;
   }
 
-  bool must_retime() const {
-    return !window_->folded() && !config_.state_td_s &&
-           std::abs(window_->calibration().td_s - window_->timing_td_s()) > kRetimeS;
-  }
-
   void record(core::TimeNs t_ns) {
     const core::State state = unpack_state(window_->newest().x.data());
     const auto P = covariance_.block<core::kStateDof, core::kStateDof>(core::kCovLastState, core::kCovLastState);
@@ -192,6 +175,7 @@ class OnlineEstimate {
 
   const core::MeasurementLog& log_;
   const EstimatorConfig& config_;
+  std::size_t first_frame_;
   std::optional<Window> window_;
   std::optional<core::InitialPrior> sound_;  // the last state that fitted
   bool newest_stays_ = true;
@@ -204,8 +188,9 @@ class OnlineEstimate {
 
 }  // namespace
 
-core::EstimateLog estimate_in_window(const core::MeasurementLog& log, const EstimatorConfig& config) {
-  OnlineEstimate online(log, config);
+core::EstimateLog estimate_in_window(const core::MeasurementLog& log, const EstimatorConfig& config,
+                                     std::size_t first_frame) {
+  OnlineEstimate online(log, config, first_frame);
   const std::optional<Failure> failure = online.run();
   core::EstimateLog result = online.take();
   if (failure) {

@@ -68,6 +68,14 @@ core::RigCalibration Window::calibration() const {
   return calibration;
 }
 
+std::vector<core::StampedState> Window::states() const {
+  std::vector<core::StampedState> states;
+  for (const auto& frame : frames_) {
+    if (frame->frame) states.push_back({log_.imu[frame->sample].t_ns, unpack_state(frame->x.data())});
+  }
+  return states;
+}
+
 FrameTiming Window::timing_of(const WindowFrame& frame, const core::ImuBias& bias) const {
   const core::CalibrationSigmas& sigma = calibration_sigma_;
   const double sample_s = core::to_seconds(log_.imu[1].t_ns - log_.imu[0].t_ns);
@@ -229,7 +237,13 @@ void Window::triangulate() {
     for (const WindowObservation& o : point.observations) {
       views.push_back({camera_pose(*o.frame, o.pixel.y()), o.pixel});
     }
-    point.landmark = estimator::triangulate(camera(), views);
+    // Of so many at once some may be wrong, and would take the point out of reach of the rest.
+    constexpr std::size_t kMany = 6;
+    const auto agreed =
+        views.size() < kMany
+            ? std::nullopt
+            : triangulate_agreeing(camera(), views, config_.window.outlier_sigma * noise_.pixel_sigma_px);
+    point.landmark = agreed ? *agreed : estimator::triangulate(camera(), views);
     point.anchor = point.observations.front().frame;
     point.T_B_A = unpack_pose(extrinsics_.data());
     if (is_free_point()) {

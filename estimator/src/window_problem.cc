@@ -152,6 +152,26 @@ WindowSolution Window::solve(bool doubtful) {
   return solution;
 }
 
+std::optional<double> Window::relative_scale_sigma() {
+  const Built built = build_all();
+  SchurSystem system(built.problem);
+  if (!system.build(0.0) || !system.solve()) return std::nullopt;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::size_t i = 1; i < frames_.size(); ++i) {
+    mean += frames_[i]->x.head<3>() / static_cast<double>(frames_.size() - 1);
+  }
+  Eigen::VectorXd w = Eigen::VectorXd::Zero(system.columns());
+  double squares = 0.0;
+  for (std::size_t i = 1; i < frames_.size(); ++i) {
+    const Eigen::Vector3d arm = frames_[i]->x.head<3>() - mean;
+    w.segment<3>(system.column(built.of(frames_[i]->x.data())) + core::kPosition) = arm;
+    squares += arm.squaredNorm();
+  }
+  // H = L L^T, so that w^T H^-1 w = |L^-1 w|^2.
+  const Eigen::MatrixXd L = system.trailing_factor(system.columns());
+  return L.triangularView<Eigen::Lower>().solve(w).norm() / squares;
+}
+
 WindowFit Window::assess(bool reject) {
   WindowFit fit;
   const double limit = config_.window.outlier_sigma * config_.window.outlier_sigma;

@@ -6,12 +6,14 @@
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "core/lie.h"
 #include "core/state.h"
+#include "eval/initialisation_error.h"
 #include "eval/line_error.h"
 #include "eval/nees.h"
 #include "eval/trajectory_error.h"
@@ -136,8 +138,13 @@ std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const Covar
   const bool intrinsics = estimate.calibration.intrinsics.has_value();
   if (intrinsics) calibration = joined(std::move(calibration), indices(core::kCovIntrinsics, 4));
   std::vector<int> last;
-  for (const auto& [offset, dof] : {std::pair(kPose, 6), std::pair(kVelocity, 3), std::pair(kBias, 6)}) {
-    if (m.is_free(offset, dof)) last = joined(std::move(last), indices(offset, dof));
+  // Begun from scratch, an estimate has a world of its own: no NEES of what only an alignment compares.
+  const bool pose = m.is_free(kPose, 6) && !estimate.initialisation;
+  const bool velocity = m.is_free(kVelocity, 3) && !estimate.initialisation;
+  const bool bias = m.is_free(kBias, 6);
+  for (const auto& [claimed, offset, dof] :
+       {std::tuple(pose, kPose, 6), std::tuple(velocity, kVelocity, 3), std::tuple(bias, kBias, 6)}) {
+    if (claimed) last = joined(std::move(last), indices(offset, dof));
   }
 
   const double extrinsic_m = m.norm3(core::kCovExtrinsicPosition);
@@ -155,14 +162,13 @@ std::vector<Metric> block_metrics(const core::EstimateLog& estimate, const Covar
     m.add("intrinsics", m.norm(core::kCovIntrinsics, 4), indices(core::kCovIntrinsics, 4), true);
   }
   m.add("calibration", extrinsic_m, calibration, true);
-  m.add("final_pose", position_m, indices(kPose, 6), m.is_free(kPose, 6));
-  m.add("final_position", position_m, indices(kPose, 3), m.is_free(kPose, 6));
-  m.add("final_orientation_deg", m.norm3(kOrientation) * core::kDegreesPerRadian, indices(kOrientation, 3),
-        m.is_free(kPose, 6));
-  m.add("final_velocity", m.norm3(kVelocity), indices(kVelocity, 3), m.is_free(kVelocity, 3));
+  m.add("final_pose", position_m, indices(kPose, 6), pose);
+  m.add("final_position", position_m, indices(kPose, 3), pose);
+  m.add("final_orientation_deg", m.norm3(kOrientation) * core::kDegreesPerRadian, indices(kOrientation, 3), pose);
+  m.add("final_velocity", m.norm3(kVelocity), indices(kVelocity, 3), velocity);
   m.add("final_gyro_bias", m.norm3(kBias), indices(kBias, 3), m.is_free(kBias, 3));
   m.add("final_accel_bias", m.norm3(kBias + 3), indices(kBias + 3, 3), m.is_free(kBias + 3, 3));
-  m.add("final_bias", m.norm3(kBias), indices(kBias, 6), m.is_free(kBias, 6));
+  m.add("final_bias", m.norm3(kBias), indices(kBias, 6), bias);
   m.add("final_state", position_m, last, true);
   m.add("joint", position_m, joined(calibration, last), true);
   return m.take();
@@ -177,6 +183,22 @@ std::optional<Metric> td_convergence(const core::EstimateLog& estimate, double t
   Metric metric{std::string(kTdConvergence), core::to_seconds(t_ns - estimate.states.front().t_ns)};
   metric.censored = !settled;
   return metric;
+}
+
+// What began from scratch, in the truth's world.
+core::EstimateLog in_true_world(core::EstimateLog estimate, const std::vector<PosePair>& pairs) {
+  std::vector<Eigen::Vector3d> estimated;
+  std::vector<Eigen::Vector3d> truth;
+  for (const PosePair& pair : pairs) {
+    estimated.push_back(pair.estimate.p);
+    truth.push_back(pair.truth.p);
+  }
+  const Similarity T = align(estimated, truth, Alignment::kPosyaw).truth_from_estimate;
+  for (core::StampedState& s : estimate.states) {
+    s.state.T_W_B = T * s.state.T_W_B;
+    s.state.v_W = T.R * s.state.v_W;
+  }
+  return estimate;
 }
 
 // On the grid of a series.
@@ -219,7 +241,8 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
   if (!ate.ok) throw Unusable(ate.reason);
   if (!is_finite(estimate)) throw Unusable("a velocity, bias, calibration or covariance is not finite");
 
-  const CovarianceTangent e = unaligned_error(estimate, truth.calibration, states.back());
+  const CovarianceTangent e = unaligned_error(estimate.initialisation ? in_true_world(estimate, pairs) : estimate,
+                                              truth.calibration, states.back());
   result.metrics = block_metrics(estimate, e);
   result.metrics.insert(result.metrics.begin(),
                         {{"ate_position_m", ate.position_m.rmse}, {"ate_rotation_deg", ate.rotation_deg.rmse}});
@@ -235,6 +258,9 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
     }
     result.metrics.push_back({std::string(kLineShare), lines.share});
   }
+  if (estimate.initialisation) {
+    std::ranges::move(initialisation_errors(*estimate.initialisation, truth), std::back_inserter(result.metrics));
+  }
   if (estimate.restarts) result.metrics.push_back({"restarts", static_cast<double>(*estimate.restarts)});
   if (estimate.knots) {
     result.metrics.push_back({"knot_interval_s", estimate.knots->interval_s});
@@ -244,7 +270,7 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
     result.metrics.push_back(std::move(*convergence));
   }
   result.series = make_series(pairs, ate, estimate.td_history, truth.calibration.td_s);
-  result.series.nees = online_nees(estimate, truth);
+  if (!estimate.initialisation) result.series.nees = online_nees(estimate, truth);
   for (const Metric& metric : result.metrics) {
     if (!std::isfinite(metric.value)) throw Unusable(metric.name + " overflows");
   }

@@ -167,6 +167,9 @@ void check_cell(const Experiment& e) {
         e.scenario.prior.calibration_sigmas(), has_lines);
   }
   if (e.metrics.crlb) {
+    if (estimator::starts_from_scratch(e.estimator)) {
+      throw core::RuleError({"eval.crlb", "is of what the prior says of the first state, too; not from scratch"});
+    }
     if (e.metrics.first_n > 0 || e.metrics.first_s > 0.0) {
       throw core::RuleError({"eval.crlb", "is of an alignment by all poses; leave out first_n and first_s"});
     }

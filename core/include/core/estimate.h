@@ -98,6 +98,16 @@ struct KnotCheck {
   double excess_sigmas = 0.0;
 };
 
+// How an estimate came to its first states without being told them. World: the first of them at the origin, z up, any
+// yaw.
+struct Initialisation {
+  TimeNs since_ns = 0;                // IMU clock: the first sample
+  TimeNs at_ns = 0;                   // the newest of the states
+  std::vector<StampedState> aligned;  // by geometry alone
+  std::vector<StampedState> states;   // refined
+  double relative_scale_sigma = 0.0;  // of the refined ones
+};
+
 struct EstimateLog {
   SolveStatus status = SolveStatus::kFailedInitialisation;
   std::string reason;  // one line where the status is not kConverged
@@ -109,10 +119,11 @@ struct EstimateLog {
   PosteriorCovariance covariance = PosteriorCovariance::Zero();
   std::vector<TimeOffsetEstimate> td_history;
   std::vector<LineEstimate> lines;
-  int line_tracks = 0;                     // of lines that two keyframes or more see; estimated or not
-  std::vector<OnlineState> state_history;  // empty where the estimator keeps none
-  std::optional<int> restarts;             // how often it began anew after a failure; absent where it may not
-  std::optional<KnotCheck> knots;          // where the trajectory is a spline
+  int line_tracks = 0;                           // of lines that two keyframes or more see; estimated or not
+  std::vector<OnlineState> state_history;        // empty where the estimator keeps none
+  std::optional<Initialisation> initialisation;  // from scratch; absent where it began from the prior
+  std::optional<int> restarts;                   // how often it began anew after a failure; absent where it may not
+  std::optional<KnotCheck> knots;                // where the trajectory is a spline
   SolveSummary summary;
 };
 

@@ -14,12 +14,13 @@
 
 namespace plumbline::estimator {
 
-enum class EstimatorType { kBatch, kSlidingWindow, kExternal };
-inline constexpr std::array<std::string_view, 3> kEstimatorTypeNames = {"batch", "sliding_window", "external"};
+enum class EstimatorType { kBatch, kSlidingWindow, kInitialisation, kExternal };
+inline constexpr std::array<std::string_view, 4> kEstimatorTypeNames = {"batch", "sliding_window", "initialisation",
+                                                                        "external"};
 enum class TimingModel { kPropagated, kFeatureVelocity, kSpline };
 inline constexpr std::array<std::string_view, 3> kTimingModelNames = {"propagated", "feature_velocity", "spline"};
-enum class Initialisation { kPrior };
-inline constexpr std::array<std::string_view, 1> kInitialisationNames = {"prior"};
+enum class Initialisation { kPrior, kFromScratch };
+inline constexpr std::array<std::string_view, 2> kInitialisationNames = {"prior", "from_scratch"};
 enum class Solver { kSchur, kCeres };
 inline constexpr std::array<std::string_view, 2> kSolverNames = {"schur", "ceres"};
 enum class RobustLoss { kNone, kHuber, kCauchy };
@@ -72,6 +73,15 @@ struct WindowConfig {
   int restarts = 0;
 };
 
+// Of `initialisation: from_scratch` (estimator/from_scratch.h).
+struct FromScratchConfig {
+  double longest_s = 3.0;
+  double least_parallax_px = 10.0;
+  double largest_scale_sigma = 0.05;
+  double gyro_bias_sigma_rad_s = 0.05;
+  double accel_bias_sigma_m_s2 = 0.2;
+};
+
 // Of `external`: a program that is given the dataset (docs/interoperability.md). None of the other keys is its.
 struct ExternalConfig {
   std::filesystem::path command;
@@ -100,10 +110,15 @@ struct EstimatorConfig {
   LineRules lines;
   SplineConfig spline;
   WindowConfig window;
+  FromScratchConfig from_scratch;
   ExternalConfig external;
   int max_iterations = 50;
   double max_cost_per_dof = 2.0;
 };
+
+inline bool starts_from_scratch(const EstimatorConfig& config) {
+  return config.initialisation == Initialisation::kFromScratch || config.type == EstimatorType::kInitialisation;
+}
 
 void visit(core::ConfigVisitor& v, EstimatorConfig& c);
 

@@ -5,12 +5,16 @@
 // by tenths of a pixel. From then on the oldest state leaves with each new one (estimator/window.h).
 #pragma once
 
+#include <cstddef>
+
 #include "core/estimate.h"
 #include "core/measurements.h"
 #include "estimator/config.h"
 
 namespace plumbline::estimator {
 
-core::EstimateLog estimate_in_window(const core::MeasurementLog& log, const EstimatorConfig& config);
+// The first estimate is that of the frame `first_frame`, from all keyframes between the prior's instant and it.
+core::EstimateLog estimate_in_window(const core::MeasurementLog& log, const EstimatorConfig& config,
+                                     std::size_t first_frame = 0);
 
 }  // namespace plumbline::estimator

@@ -100,6 +100,8 @@ struct WindowSolution {
 struct WindowFit {
   core::ResidualSum visual;
   int outliers = 0;
+
+  double squares_per_residual() const { return visual.residuals > 0 ? visual.squares / visual.residuals : 0.0; }
 };
 
 class Window {
@@ -137,6 +139,14 @@ class Window {
 
   // While nothing has left: puts the states where td says that the frames were.
   void retime(double td_s);
+
+  // sigma(s)/s of the scale by which the path of the frames is longer or shorter than it should be: that of
+  //   s = sum_k (p_k - mean) . dp_k / sum_k |p_k - mean|^2
+  // Nothing where the information is singular.
+  std::optional<double> relative_scale_sigma();
+
+  // Of the frames.
+  std::vector<core::StampedState> states() const;
 
   std::size_t size() const { return frames_.size(); }
   bool folded() const { return prior_ != nullptr; }

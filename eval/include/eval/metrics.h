@@ -35,6 +35,13 @@
 //   knot_excess           likewise: how far the IMU's residuals exceed their noise, in sigmas (core::KnotCheck)
 //   td_convergence_s      since the first estimated state: the first instant after which |td error| stays within
 //                         eval.td_bound_s for the rest; only where the estimator keeps a history of td
+//   init_time_s           of data, from the first IMU sample to the newest state; these six where the estimate began
+//                         from scratch (eval/initialisation_error.h)
+//   init_aligned_scale_error  relative, by geometry alone                    -
+//   init_scale_error      relative, refined                                  1 dof
+//   init_gravity_deg      angle, of the newest refined state                 -
+//   init_velocity_m_s     norm, in the body frame                            -
+//   init_gyro_bias_rad_s  norm                                               -
 // A joint block's units do not mix in a norm, so its value is that of the position in it.
 #pragma once
 
@@ -70,7 +77,7 @@ inline constexpr std::string_view kLineAngle = "line_angle_deg";
 inline constexpr std::string_view kLineDistance = "line_distance_m";
 inline constexpr std::string_view kLineShare = "line_share";
 
-inline constexpr std::array<MetricInfo, 31> kMetrics = {{
+inline constexpr std::array<MetricInfo, 37> kMetrics = {{
     {"ate_position_m", "ATE position [mm]", 1e3},
     {"ate_rotation_deg", "ATE rotation [deg]", 1.0},
     {"td_error_s", "td error [us]", 1e6, true},
@@ -101,6 +108,12 @@ inline constexpr std::array<MetricInfo, 31> kMetrics = {{
     {"knot_interval_s", "interval of knots [s]", 1.0, false, false},
     {"knot_excess", "IMU residuals over noise [sigma]", 1.0, false, false},
     {kTdConvergence, "td convergence [s]", 1.0, false, false},
+    {"init_time_s", "time to initialise [s]"},
+    {"init_aligned_scale_error", "initial scale, aligned [%]", 100.0},
+    {"init_scale_error", "initial scale [%]", 100.0, true},
+    {"init_gravity_deg", "initial gravity [deg]"},
+    {"init_velocity_m_s", "initial velocity [mm/s]", 1e3},
+    {"init_gyro_bias_rad_s", "initial gyro bias [deg/h]", 3600.0 * core::kDegreesPerRadian},
     {kKappa2, "kappa2 of the bound", 1.0, false, false},
 }};
 
