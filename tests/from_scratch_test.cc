@@ -216,6 +216,17 @@ TEST(FromScratch, NothingOfThePriorsStateIsUsed) {
   }
 }
 
+// The batch in continuous time starts from the states of a window, which has none.
+TEST(FromScratch, BeginsABatchInContinuousTime) {
+  const auto s = sim::simulate(scenario(), {1, 1});
+  estimator::EstimatorConfig config = scratch(estimator::EstimatorType::kBatch);
+  config.timing = estimator::TimingModel::kSpline;
+  const core::EstimateLog log = estimator::estimate(s.measurements, config);
+  ASSERT_EQ(log.status, core::SolveStatus::kConverged) << log.reason;
+  EXPECT_LT(std::abs(log.calibration.td_s - s.truth.calibration.td_s),
+            4.5 * std::sqrt(log.covariance(core::kCovTd, core::kCovTd)));
+}
+
 // Noise and wrong matches; td from 50 ms off.
 TEST(FromScratch, FindsTdWithoutKnowingIt) {
   for (const double td_s : {-0.05, 0.05}) {

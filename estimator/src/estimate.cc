@@ -67,7 +67,9 @@ void carry_to_the_first_sample(const core::MeasurementLog& log, core::InitialPri
 }
 
 core::EstimateLog estimate_from_scratch(const core::MeasurementLog& log, const EstimatorConfig& config) {
-  FromScratch scratch = initialise_from_scratch(log, config);
+  EstimatorConfig on_states = config;  // a window has no knots
+  if (config.timing == TimingModel::kSpline) on_states.timing = TimingModel::kPropagated;
+  FromScratch scratch = initialise_from_scratch(log, on_states);
   if (!scratch.found || config.type == EstimatorType::kInitialisation) return std::move(scratch.log);
   core::MeasurementLog begun = log;
   begun.prior = scratch.prior;
