@@ -23,14 +23,14 @@ std::optional<RotationAlignment> align_rotations(std::span<const core::ImuSample
                                                  std::span<const double> stamps_s,
                                                  const std::vector<Eigen::Quaterniond>& rotations, double sigma_rad,
                                                  const RotationPrior& prior) {
-  constexpr int kMostIterations = 20;
+  constexpr int kMostFits = 20;
   constexpr double kSmallStep = 1e-4;  // in sigmas
   Unknowns sigma;
   sigma << Eigen::Vector3d::Constant(prior.gyro_bias_sigma_rad_s), prior.td_sigma_s,
       Eigen::Vector3d::Constant(prior.R_B_C_sigma_rad);
   RotationAlignment result{.td_s = prior.td_s, .R_B_C = prior.R_B_C};
   Unknowns u = Unknowns::Zero();
-  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+  for (int iteration = 0; iteration < kMostFits; ++iteration) {
     const ImuPath path =
         imu_path(imu, origin_ns, shifted(stamps_s, result.td_s), {.gyro_rad_s = result.gyro_bias_rad_s});
     const Eigen::Matrix3d R_B_C = result.R_B_C.toRotationMatrix();
