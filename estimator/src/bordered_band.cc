@@ -38,7 +38,7 @@ BorderedBand::BorderedBand(std::vector<int> reach, int border)
 }
 
 double* BorderedBand::at(int row, int col) {
-  if (row >= banded_) return &border_(row - banded_, col);
+  if (row >= banded_) return border_.data() + (row - banded_) + static_cast<Eigen::Index>(col) * border();
   return band_.data() + kMostAbove + (row - col) + static_cast<Eigen::Index>(col) * height_;
 }
 
