@@ -393,7 +393,7 @@ TEST_F(CommandLine, CheckTellsWhatAFileIs) {
       if (file.path().filename().string().starts_with("recorded")) {
         EXPECT_EQ(plumbline(arguments).code, 2);  // names no pose file of its own
         std::string poses;
-        for (int i = 0; i <= 50 * 20; ++i) poses += std::to_string(i * 0.05) + " 1 2 3 0 0 0 1\n";
+        for (int i = 0; i <= 150 * 20; ++i) poses += std::to_string(i * 0.05) + " 1 2 3 0 0 0 1\n";
         arguments += " --set scenario.trajectory.file=" + write("poses.tum", poses).string();
       }
       const Result result = plumbline(arguments);
