@@ -359,18 +359,22 @@ TEST_F(Evaluate, OnlineNeesIsUnalignedAndPerBlock) {
     estimate_.state_history.push_back({t_ns, core::plus(x, e), P});
   }
   const TrialResult result = evaluate(Alignment::kSe3);
-  ASSERT_EQ(result.series.nees.size(), 2U);
+  ASSERT_EQ(result.series.online.size(), 2U);
   const auto expected = [&](int offset, int dof) {
     return e.segment(offset, dof).dot(P.block(offset, offset, dof, dof).ldlt().solve(e.segment(offset, dof)));
   };
-  const NeesPoint& point = result.series.nees[1];
+  const OnlinePoint& point = result.series.online[1];
   EXPECT_DOUBLE_EQ(point.t_s, 4.0);
-  EXPECT_NEAR(point.position / expected(0, 3), 1.0, 1e-6);
-  EXPECT_NEAR(point.orientation / expected(3, 3), 1.0, 1e-6);
-  EXPECT_NEAR(point.pose / expected(0, 6), 1.0, 1e-6);
-  EXPECT_NEAR(point.velocity / expected(6, 3), 1.0, 1e-6);
-  EXPECT_NEAR(point.bias / expected(9, 6), 1.0, 1e-6);
-  EXPECT_EQ(to_json(result.series).at("nees").at("pose").size(), 2U);
+  EXPECT_NEAR(point.position_nees / expected(0, 3), 1.0, 1e-6);
+  EXPECT_NEAR(point.orientation_nees / expected(3, 3), 1.0, 1e-6);
+  EXPECT_NEAR(point.pose_nees / expected(0, 6), 1.0, 1e-6);
+  EXPECT_NEAR(point.velocity_nees / expected(6, 3), 1.0, 1e-6);
+  EXPECT_NEAR(point.bias_nees / expected(9, 6), 1.0, 1e-6);
+  EXPECT_DOUBLE_EQ(point.position_sigma_m.z(), std::sqrt(P(2, 2)));
+  EXPECT_DOUBLE_EQ(point.orientation_sigma_rad.x(), std::sqrt(P(3, 3)));
+  const auto json = to_json(result.series);
+  EXPECT_EQ(json.at("nees").at("pose").size(), 2U);
+  EXPECT_EQ(json.at("sigma").at("rotation_rad").at(2).at(1), point.orientation_sigma_rad.z());
   estimate_.state_history[0].covariance.setZero();
   const std::string stamp = std::to_string(estimate_.state_history[0].t_ns);
   expect_unusable("the online covariance at " + stamp + " ns is singular or indefinite");

@@ -87,11 +87,9 @@ ExactPath exact_path() {
 // Every sign and side of the linear system: with exact input all that is left is the integrator's error.
 TEST(ScaleAlignment, IsExactWithoutNoise) {
   const ExactPath exact = exact_path();
-  std::vector<double> times = exact.stamps_s;
-  for (double& t : times) t += exact.rig.td_s;
   const core::ImuBias& bias = exact.bodies.front().bias;
-  const auto path =
-      estimator::imu_path(exact.simulation.measurements.imu, exact.origin_ns, times, {.gyro_rad_s = bias.gyro_rad_s});
+  const auto path = estimator::imu_path(exact.simulation.measurements.imu, exact.origin_ns, exact.stamps_s,
+                                        exact.rig.td_s, {.gyro_rad_s = bias.gyro_rad_s});
   std::vector<Eigen::Vector3d> centres;
   for (const core::Pose& pose : exact.cameras) centres.push_back(pose.p);
   const auto found = estimator::align_scale(path, centres, exact.rig.T_B_C, 9.81, 0.2);
@@ -119,7 +117,7 @@ TEST(ScaleAlignment, SaysWhereTheScaleIsUnknown) {
     // A thousandth of a unit, as pictures would leave it.
     centres.push_back((T_C0_W * at.state.T_W_B * rig.T_B_C).p + 1e-3 * kRandom.normal3(k));
   }
-  const auto path = estimator::imu_path(s.measurements.imu, s.truth.states.front().t_ns, times,
+  const auto path = estimator::imu_path(s.measurements.imu, s.truth.states.front().t_ns, times, 0.0,
                                         {.gyro_rad_s = s.truth.states.front().state.bias.gyro_rad_s});
   const auto found = estimator::align_scale(path, centres, rig.T_B_C, 9.81, 0.2);
   EXPECT_TRUE(!found || found->relative_sigma > 0.3) << found->relative_sigma;

@@ -25,7 +25,7 @@ using testing::kEurocLike;
 estimator::EstimatorConfig on_spline(estimator::EstimatorConfig config,
                                      std::optional<double> knot_interval_s = std::nullopt, int order = 6) {
   config.timing = estimator::TimingModel::kSpline;
-  config.spline = {.knot_interval_s = knot_interval_s, .order = order};
+  config.spline = {.knot_spacing_s = knot_interval_s, .order = order};
   return config;
 }
 

@@ -141,7 +141,7 @@ core::EstimateLog grow_and_refine(const BatchInput& input) {
   grow(input, values, timing_td_s);
 
   const bool on_spline = config.timing == TimingModel::kSpline;
-  const std::optional<double>& given_s = config.spline.knot_interval_s;
+  const std::optional<double>& given_s = config.spline.knot_spacing_s;
   double knot_interval_s = 0.0;
   if (on_spline) knot_interval_s = given_s ? *given_s : knot_interval_by_motion(input, values);
 

@@ -15,9 +15,9 @@ BatchProblem::Timings BatchProblem::frame_timings() const {
   const double sample_s = core::to_seconds(input_.log.imu[1].t_ns - input_.log.imu[0].t_ns);
   const double margin_s = 0.5 * std::abs(readout_s_) + sample_s + 5.0 * (sigma.td_s + sigma.readout_s);
   Timings timings;
-  if (on_spline_) {
+  if (spline_) {
     for (const std::size_t frame : input_.keyframes) {
-      timings.push_back({nullptr, spline_.seconds(input_.log, input_.log.frames[frame].t_cam_ns)});
+      timings.push_back({nullptr, spline_->seconds(input_.log, input_.log.frames[frame].t_cam_ns)});
     }
     return timings;
   }
@@ -85,7 +85,7 @@ bool BatchProblem::add_point(const PointModel& model, const Timings& timings, co
   }
   const std::size_t of_anchor = terms.size();
   for (auto o = track.observations.begin() + 1; o != track.observations.end() && o->keyframe < timings.size(); ++o) {
-    if (on_spline_) {
+    if (spline_) {
       terms.push_back(spline_point(model, timings, first, *o));
       continue;
     }
@@ -124,7 +124,7 @@ bool BatchProblem::add_line(const LineModel& model, const Timings& timings, std:
   std::vector<Term> terms;
   for (const LineTrackObservation& o : input_.line_tracks[track].observations) {
     if (o.keyframe >= timings.size()) break;
-    if (on_spline_) {
+    if (spline_) {
       terms.push_back(spline_line(model, timings, o, line.origin_W));
       continue;
     }

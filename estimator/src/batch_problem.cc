@@ -30,14 +30,13 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values, S
     : input_(input),
       phase_(phase),
       start_(values),
-      on_spline_(values.spline.has_value()),
-      spline_(values.spline.value_or(TrajectorySpline{})),
+      spline_(values.spline),
       extrinsics_(pack(values.calibration.T_B_C)),
       td_s_(values.calibration.td_s),
       readout_s_(values.calibration.readout_s),
       loss_(phase == SolvePhase::kSearch ? make_loss(RobustLoss::kCauchy, kSearchLossScale)
                                          : make_loss(input.config.loss, input.config.loss_scale)) {
-  if (on_spline_) {
+  if (spline_) {
     add_spline_blocks();
   } else {
     for (const core::State& state : values.states) states_.push_back(pack(state));
@@ -61,7 +60,7 @@ BatchProblem::BatchProblem(const BatchInput& input, const BatchValues& values, S
   first_line_block_ = static_cast<int>(problem_.blocks.size());
   add_lines(timings);
   inertial_begin_ = problem_.terms.size();
-  if (on_spline_) {
+  if (spline_) {
     add_spline_inertial_factors();
   } else {
     add_inertial_factors();
@@ -89,9 +88,9 @@ void BatchProblem::add_priors() {
   const core::RigCalibration& mean = prior.calibration;
   const core::CalibrationSigmas& sigma = prior.calibration_sigma;
   const EstimateWhat& free = input_.config.estimate;
-  if (on_spline_) {
-    const SplineInstant at = spline_.at(input_.log, prior.t_ns);
-    add_term({std::make_unique<SplineState>(spline_.knots, at, prior.mean, prior.sigma), blocks_at(at)}, nullptr);
+  if (spline_) {
+    const SplineInstant at = spline_->at(input_.log, prior.t_ns);
+    add_term({std::make_unique<SplineState>(spline_->knots, at, prior.mean, prior.sigma), blocks_at(at)}, nullptr);
   } else {
     add_term({std::make_unique<StatePriorFactor>(prior.mean, prior.sigma), {0}}, nullptr);
   }
@@ -163,7 +162,7 @@ BatchValues BatchProblem::values() const {
   BatchValues values = start_;
   values.calibration = {.T_B_C = unpack_pose(extrinsics_.data()), .td_s = td_s_, .readout_s = readout_s_};
   for (std::size_t i = 0; i < states_.size(); ++i) values.states[i] = unpack_state(states_[i].data());
-  if (on_spline_) {
+  if (spline_) {
     values.spline = spline_;
     for (std::size_t i = 0; i < values.states.size(); ++i) {
       values.states[i] = state_on_spline(input_.log.imu[values.samples[i]].t_ns);
@@ -178,7 +177,7 @@ BatchValues BatchProblem::values() const {
 std::optional<core::PosteriorCovariance> BatchProblem::covariance() {
   if (!system_) system_.emplace(problem_);
   const EstimateWhat& free = input_.config.estimate;
-  if (!on_spline_) return posterior_covariance(*system_, free);
+  if (!spline_) return posterior_covariance(*system_, free);
   return posterior_covariance(*system_, free, newest_state_by_columns(*system_, calibration_columns(free)));
 }
 

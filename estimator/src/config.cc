@@ -34,7 +34,7 @@ static void visit(core::ConfigVisitor& v, LineRules& c) {
 
 static void visit(core::ConfigVisitor& v, SplineConfig& c) {
   v.value(
-      "knot_spacing_s", c.knot_interval_s, core::between(1e-3, 10.0), "motion",
+      "knot_spacing_s", c.knot_spacing_s, core::between(1e-3, 10.0), "motion",
       "at most; `motion`: as wide as leaves nothing but noise in the IMU's samples. Where residuals of the IMU exceed "
       "its noise at the solution, the knots of `motion` are doubled, and those that are given are a failed trial");
   v.value("order", c.order, core::between(4, 6), "of the B-spline: 6 is quintic");

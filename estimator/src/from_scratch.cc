@@ -61,15 +61,9 @@ class Attempt {
             .least_parallax = config_.from_scratch.least_parallax_px / camera_.fx_px};
   }
 
-  std::vector<double> times(double td_s) const {
-    std::vector<double> times = stamps_s_;
-    for (double& t : times) t += td_s;
-    return times;
-  }
-
   // z ~ R_B_C^T Exp(w dt) R_B_C z_row, dt the row's time after the middle one.
   std::vector<PictureRays> pictures() const {
-    const ImuPath path = imu_path(log_.imu, origin_ns_, times(rig_.td_s), {});
+    const ImuPath path = imu_path(log_.imu, origin_ns_, stamps_s_, rig_.td_s, {});
     std::vector<PictureRays> pictures;
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       PictureRays& rays = pictures.emplace_back();
@@ -104,7 +98,7 @@ class Attempt {
     core::RigCalibration rig = rig_;
     rig.td_s = turns->td_s;
     rig.T_B_C.q = turns->R_B_C;
-    const ImuPath path = imu_path(log_.imu, origin_ns_, times(rig.td_s), {.gyro_rad_s = turns->gyro_bias_rad_s});
+    const ImuPath path = imu_path(log_.imu, origin_ns_, stamps_s_, rig.td_s, {.gyro_rad_s = turns->gyro_bias_rad_s});
     std::vector<Eigen::Vector3d> centres;
     for (const core::Pose& pose : path_C) centres.push_back(pose.p);
     const auto scale = align_scale(path, centres, rig.T_B_C, log_.gravity_m_s2, scratch.accel_bias_sigma_m_s2);

@@ -20,13 +20,14 @@ core::ImuSample sample_at(std::span<const core::ImuSample> imu, core::TimeNs ori
 
 }  // namespace
 
-ImuPath imu_path(std::span<const core::ImuSample> imu, core::TimeNs origin_ns, std::span<const double> times_s,
-                 const core::ImuBias& bias) {
+ImuPath imu_path(std::span<const core::ImuSample> imu, core::TimeNs origin_ns, std::span<const double> stamps_s,
+                 double td_s, const core::ImuBias& bias) {
   ImuPath path;
   const auto time = [&](const core::ImuSample& s) { return core::to_seconds(s.t_ns - origin_ns); };
-  auto next = std::upper_bound(imu.begin(), imu.end(), times_s.front(),
+  const double first_s = stamps_s.front() + td_s;
+  auto next = std::upper_bound(imu.begin(), imu.end(), first_s,
                                [&](double t, const core::ImuSample& s) { return t < time(s); });
-  double now_s = times_s.front();
+  double now_s = first_s;
   core::ImuSample now = sample_at(imu, origin_ns, now_s);
   ImuIncrement x;
   const auto go_to = [&](const core::ImuSample& to, double t_s) {
@@ -34,10 +35,11 @@ ImuPath imu_path(std::span<const core::ImuSample> imu, core::TimeNs origin_ns, s
     now = to;
     now_s = t_s;
   };
-  for (const double t_s : times_s) {
+  for (const double stamp_s : stamps_s) {
+    const double t_s = stamp_s + td_s;
     for (; next != imu.end() && time(*next) < t_s; ++next) go_to(*next, time(*next));
     if (t_s > now_s) go_to(sample_at(imu, origin_ns, t_s), t_s);
-    path.t_s.push_back(t_s - times_s.front());
+    path.t_s.push_back(t_s - first_s);
     path.motion.push_back(x);
     path.rate_B.push_back(now.gyro_rad_s - bias.gyro_rad_s);
   }

@@ -11,12 +11,6 @@ namespace {
 using Unknowns = Eigen::Matrix<double, 7, 1>;  // [ b_g | td | theta_B_C ], each in its sigma
 using Rows = Eigen::Matrix<double, 3, 7>;
 
-std::vector<double> shifted(std::span<const double> stamps_s, double td_s) {
-  std::vector<double> times(stamps_s.begin(), stamps_s.end());
-  for (double& t : times) t += td_s;
-  return times;
-}
-
 }  // namespace
 
 std::optional<RotationAlignment> align_rotations(std::span<const core::ImuSample> imu, core::TimeNs origin_ns,
@@ -31,8 +25,7 @@ std::optional<RotationAlignment> align_rotations(std::span<const core::ImuSample
   RotationAlignment result{.td_s = prior.td_s, .R_B_C = prior.R_B_C};
   Unknowns u = Unknowns::Zero();
   for (int iteration = 0; iteration < kMostFits; ++iteration) {
-    const ImuPath path =
-        imu_path(imu, origin_ns, shifted(stamps_s, result.td_s), {.gyro_rad_s = result.gyro_bias_rad_s});
+    const ImuPath path = imu_path(imu, origin_ns, stamps_s, result.td_s, {.gyro_rad_s = result.gyro_bias_rad_s});
     const Eigen::Matrix3d R_B_C = result.R_B_C.toRotationMatrix();
     Eigen::Matrix<double, 7, 7> N = Eigen::Matrix<double, 7, 7>::Identity();
     Unknowns h = u;

@@ -42,8 +42,8 @@ struct SchurSystem::Rows {
 
 SchurSystem::SchurSystem(const LeastSquares& problem) : problem_(problem), layout_(problem.blocks.size()) { lay_out(); }
 
-// What is shared is the border; every other block reaches down to the last that a landmark, a
-// term or the prior joins it with.
+// What is shared is the border; every other block reaches down to the last that a landmark, a term or the prior joins
+// it with.
 void SchurSystem::lay_out() {
   int columns = 0;
   int banded = 0;

@@ -15,7 +15,7 @@ LeastSquaresResult solve_with_schur(const LeastSquares& problem, const LeastSqua
   constexpr double kLargestDamping = 1e8;
   constexpr double kRounding = 1e-12;  // of a cost
   constexpr double kUndamped = 1e-3;   // up to here a short step means that the minimum is near
-  constexpr double kHalved = 1.0;      // up to here a step that gains next to nothing does
+  constexpr double kQuartered = 3.0;   // up to here a step that gains next to nothing does: damping is a power of ten
   LeastSquaresResult result;
   result.status = core::SolveStatus::kIterationLimit;
   std::vector<double> before;
@@ -57,7 +57,7 @@ LeastSquaresResult solve_with_schur(const LeastSquares& problem, const LeastSqua
         const double lowered_by = result.final_cost - system.built_cost();
         result.final_cost = system.built_cost();
         const double least_gain = 0.5 * options.step_tolerance * options.step_tolerance;
-        if ((damping > kUndamped && damping <= kHalved && lowered_by <= least_gain) ||
+        if ((damping > kUndamped && damping <= kQuartered && lowered_by <= least_gain) ||
             (options.cost_tolerance > 0.0 && damping <= kUndamped &&
              lowered_by < options.cost_tolerance * result.final_cost)) {
           result.status = core::SolveStatus::kConverged;

@@ -156,15 +156,15 @@ std::optional<double> Window::relative_scale_sigma() {
   const Built built = build_all();
   SchurSystem system(built.problem);
   if (!system.build(0.0) || !system.solve()) return std::nullopt;
+  const std::vector<core::StampedState> states = this->states();
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (std::size_t i = 1; i < frames_.size(); ++i) {
-    mean += frames_[i]->x.head<3>() / static_cast<double>(frames_.size() - 1);
-  }
+  for (const core::StampedState& s : states) mean += s.state.T_W_B.p / static_cast<double>(states.size());
   Eigen::VectorXd w = Eigen::VectorXd::Zero(system.columns());
   double squares = 0.0;
-  for (std::size_t i = 1; i < frames_.size(); ++i) {
-    const Eigen::Vector3d arm = frames_[i]->x.head<3>() - mean;
-    w.segment<3>(system.column(built.of(frames_[i]->x.data())) + core::kPosition) = arm;
+  for (const auto& frame : frames_) {
+    if (!frame->frame) continue;
+    const Eigen::Vector3d arm = frame->x.head<3>() - mean;
+    w.segment<3>(system.column(built.of(frame->x.data())) + core::kPosition) = arm;
     squares += arm.squaredNorm();
   }
   // H = L L^T, so that w^T H^-1 w = |L^-1 w|^2.

@@ -202,11 +202,11 @@ core::EstimateLog in_true_world(core::EstimateLog estimate, const std::vector<Po
 }
 
 // On the grid of a series.
-std::vector<NeesPoint> online_nees(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
+std::vector<OnlinePoint> online_points(const core::EstimateLog& estimate, const sim::GroundTruth& truth) {
   std::vector<core::TimeNs> stamps;
   stamps.reserve(estimate.state_history.size());
   for (const core::OnlineState& s : estimate.state_history) stamps.push_back(s.t_ns);
-  std::vector<NeesPoint> points;
+  std::vector<OnlinePoint> points;
   for (const int k : grid_indices(stamps)) {
     const core::OnlineState& s = estimate.state_history[static_cast<std::size_t>(k)];
     if (s.t_ns < truth.states.front().t_ns || s.t_ns > truth.states.back().t_ns) {
@@ -218,12 +218,15 @@ std::vector<NeesPoint> online_nees(const core::EstimateLog& estimate, const sim:
       if (!value) throw Unusable(fmt::format("the online covariance at {} ns is singular or indefinite", s.t_ns));
       return *value;
     };
+    const core::StateTangent sigma = s.covariance.diagonal().cwiseSqrt();
     points.push_back({.t_s = core::to_seconds(s.t_ns - estimate.states.front().t_ns),
-                      .position = block(core::kPosition, 3),
-                      .orientation = block(core::kOrientation, 3),
-                      .pose = block(core::kPosition, 6),
-                      .velocity = block(core::kVelocity, 3),
-                      .bias = block(core::kGyroBias, 6)});
+                      .position_sigma_m = sigma.segment<3>(core::kPosition),
+                      .orientation_sigma_rad = sigma.segment<3>(core::kOrientation),
+                      .position_nees = block(core::kPosition, 3),
+                      .orientation_nees = block(core::kOrientation, 3),
+                      .pose_nees = block(core::kPosition, 6),
+                      .velocity_nees = block(core::kVelocity, 3),
+                      .bias_nees = block(core::kGyroBias, 6)});
   }
   return points;
 }
@@ -270,7 +273,7 @@ void score(const core::EstimateLog& estimate, const sim::GroundTruth& truth, con
     result.metrics.push_back(std::move(*convergence));
   }
   result.series = make_series(pairs, ate, estimate.td_history, truth.calibration.td_s);
-  if (!estimate.initialisation) result.series.nees = online_nees(estimate, truth);
+  if (!estimate.initialisation) result.series.online = online_points(estimate, truth);
   for (const Metric& metric : result.metrics) {
     if (!std::isfinite(metric.value)) throw Unusable(metric.name + " overflows");
   }

@@ -86,13 +86,18 @@ ordered_json to_json(const Series& series) {
                   {"td_error_s", column(series.td, &TimeOffsetPoint::td_error_s)},
                   {"sigma_s", column(series.td, &TimeOffsetPoint::sigma_s)}};
   }
-  if (!series.nees.empty()) {
-    json["nees"] = {{"t_s", column(series.nees, &NeesPoint::t_s)},
-                    {"position", column(series.nees, &NeesPoint::position)},
-                    {"orientation", column(series.nees, &NeesPoint::orientation)},
-                    {"pose", column(series.nees, &NeesPoint::pose)},
-                    {"velocity", column(series.nees, &NeesPoint::velocity)},
-                    {"bias", column(series.nees, &NeesPoint::bias)}};
+  if (!series.online.empty()) {
+    const auto t_s = column(series.online, &OnlinePoint::t_s);
+    json["sigma"] = {
+        {"t_s", t_s},
+        {"position_m", columns(series.online, 3, [](const auto& p) { return p.position_sigma_m; })},
+        {"rotation_rad", columns(series.online, 3, [](const auto& p) { return p.orientation_sigma_rad; })}};
+    json["nees"] = {{"t_s", t_s},
+                    {"position", column(series.online, &OnlinePoint::position_nees)},
+                    {"orientation", column(series.online, &OnlinePoint::orientation_nees)},
+                    {"pose", column(series.online, &OnlinePoint::pose_nees)},
+                    {"velocity", column(series.online, &OnlinePoint::velocity_nees)},
+                    {"bias", column(series.online, &OnlinePoint::bias_nees)}};
   }
   if (!series.bound.empty()) {
     json["bound"] = {{"t_s", column(series.bound, &BoundPoint::t_s)},

@@ -134,18 +134,11 @@ void batch_solve(benchmark::State& state, estimator::TimingModel timing) {
   for ([[maybe_unused]] auto _ : state) observations = estimator::estimate(s.measurements, config).summary.observations;
   state.counters["observations"] = observations;
 }
-BENCHMARK_CAPTURE(batch_solve, propagated, estimator::TimingModel::kPropagated)
-    ->ArgName("ceres")
-    ->Arg(0)
-    ->Arg(1)
-    ->Unit(benchmark::kSecond)
-    ->Iterations(3);
-BENCHMARK_CAPTURE(batch_solve, spline, estimator::TimingModel::kSpline)
-    ->ArgName("ceres")
-    ->Arg(0)
-    ->Arg(1)
-    ->Unit(benchmark::kSecond)
-    ->Iterations(3);
+void with_both_solvers(benchmark::internal::Benchmark* b) {
+  b->ArgName("ceres")->Arg(0)->Arg(1)->Unit(benchmark::kSecond)->Iterations(3);
+}
+BENCHMARK_CAPTURE(batch_solve, propagated, estimator::TimingModel::kPropagated)->Apply(with_both_solvers);
+BENCHMARK_CAPTURE(batch_solve, spline, estimator::TimingModel::kSpline)->Apply(with_both_solvers);
 
 // A window of 10 keyframes and 40 kept points that moves over the same 15 s: what a keyframe takes, and in which parts.
 void window(benchmark::State& state) {

@@ -29,7 +29,7 @@ struct Source {
 constexpr double kMs = 1e3;
 constexpr double kMm = 1e3;
 constexpr double kDeg = core::kDegreesPerRadian;
-constexpr std::array<Source, 11> kSources = {{{"td_ms", "td", "td_error_s", -1, kMs},
+constexpr std::array<Source, 17> kSources = {{{"td_ms", "td", "td_error_s", -1, kMs},
                                               {"td_sigma_ms", "td", "sigma_s", -1, kMs},
                                               {"position_x_mm", "", "position_error_m", 0, kMm},
                                               {"position_y_mm", "", "position_error_m", 1, kMm},
@@ -37,6 +37,12 @@ constexpr std::array<Source, 11> kSources = {{{"td_ms", "td", "td_error_s", -1, 
                                               {"rotation_x_deg", "", "rotation_error_rad", 0, kDeg},
                                               {"rotation_y_deg", "", "rotation_error_rad", 1, kDeg},
                                               {"rotation_z_deg", "", "rotation_error_rad", 2, kDeg},
+                                              {"position_sigma_x_mm", "sigma", "position_m", 0, kMm},
+                                              {"position_sigma_y_mm", "sigma", "position_m", 1, kMm},
+                                              {"position_sigma_z_mm", "sigma", "position_m", 2, kMm},
+                                              {"rotation_sigma_x_deg", "sigma", "rotation_rad", 0, kDeg},
+                                              {"rotation_sigma_y_deg", "sigma", "rotation_rad", 1, kDeg},
+                                              {"rotation_sigma_z_deg", "sigma", "rotation_rad", 2, kDeg},
                                               {"bound_td_ms", "bound", "td_s", -1, kMs},
                                               {"bound_position_mm", "bound", "position_m", -1, kMm},
                                               {"bound_rotation_deg", "bound", "orientation_rad", -1, kDeg}}};

@@ -90,8 +90,8 @@ struct SolveSummary {
 };
 
 // Whether the knots of a trajectory spline are dense enough: of the six channels of the IMU the one with the largest
-// sum of squares of whitened residuals, less its number of samples n, over sqrt(2 n). Dense knots
-// leave it near 0, below 4.5 but for twenty cases in a million, and the less the more controls were fitted.
+// sum of squares of whitened residuals, less its number of samples n, over sqrt(2 n). Dense knots leave it near 0,
+// below 4.5 but for twenty cases in a million, and the less the more controls were fitted.
 struct KnotCheck {
   static constexpr double kMostSigmas = 4.5;
   double interval_s = 0.0;

@@ -90,8 +90,7 @@ class BatchProblem {
   SolvePhase phase_;
   BatchValues start_;
   std::vector<StateBlock> states_;
-  bool on_spline_;
-  TrajectorySpline spline_;  // in place of the states
+  std::optional<TrajectorySpline> spline_;  // in place of the states
   std::vector<int> control_blocks_;
   std::vector<int> bias_blocks_;
   PoseBlock extrinsics_;

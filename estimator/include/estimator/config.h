@@ -56,7 +56,7 @@ struct LineRules {
 
 // Of the timing `spline`.
 struct SplineConfig {
-  std::optional<double> knot_interval_s;
+  std::optional<double> knot_spacing_s;
   int order = 6;
 };
 

@@ -19,8 +19,9 @@ struct ImuPath {
   std::vector<Eigen::Vector3d> rate_B;  // w_m - b_g [rad/s] at each
 };
 
-// At origin_ns + times_s, which ascend (IMU clock). Before the first sample and after the last the nearest one holds.
-ImuPath imu_path(std::span<const core::ImuSample> imu, core::TimeNs origin_ns, std::span<const double> times_s,
-                 const core::ImuBias& bias);
+// At origin_ns + stamps_s + td, stamps that ascend (camera clock). Before the first sample and after the last the
+// nearest one holds.
+ImuPath imu_path(std::span<const core::ImuSample> imu, core::TimeNs origin_ns, std::span<const double> stamps_s,
+                 double td_s, const core::ImuBias& bias);
 
 }  // namespace plumbline::estimator

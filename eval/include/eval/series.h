@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 
 #include "core/estimate.h"
@@ -28,14 +29,16 @@ struct TimeOffsetPoint {
   double sigma_s = 0.0;
 };
 
-// NEES of what was known at an instant, unaligned.
-struct NeesPoint {
-  double t_s = 0.0;          // since the first estimated state
-  double position = 0.0;     // 3 dof
-  double orientation = 0.0;  // 3 dof
-  double pose = 0.0;         // 6 dof, [position | orientation]
-  double velocity = 0.0;     // 3 dof
-  double bias = 0.0;         // 6 dof, [gyroscope | accelerometer]
+// What an online estimator knew at an instant, unaligned: how sure it was, and its NEES.
+struct OnlinePoint {
+  double t_s = 0.0;  // since the first estimated state
+  Eigen::Vector3d position_sigma_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d orientation_sigma_rad = Eigen::Vector3d::Zero();
+  double position_nees = 0.0;     // 3 dof
+  double orientation_nees = 0.0;  // 3 dof
+  double pose_nees = 0.0;         // 6 dof, [position | orientation]
+  double velocity_nees = 0.0;     // 3 dof
+  double bias_nees = 0.0;         // 6 dof, [gyroscope | accelerometer]
 };
 
 // Roots of the Cramer-Rao bound from the measurements up to an instant (eval/cramer_rao.h), of a vector that of the
@@ -53,7 +56,7 @@ struct BoundPoint {
 struct Series {
   std::vector<SeriesPoint> points;
   std::vector<TimeOffsetPoint> td;  // empty where the estimator keeps no history
-  std::vector<NeesPoint> nees;      // likewise
+  std::vector<OnlinePoint> online;  // likewise
   std::vector<BoundPoint> bound;    // empty without eval.crlb
 };
 

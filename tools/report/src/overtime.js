@@ -67,17 +67,22 @@ function tdCharts(cell) {
 function errorChart(cell, kind, axis, unit) {
   const band = cell.bands[`${kind}_${axis}_${unit}`];
   if (!band) return null;
-  const sigma3 = band.rms.map((r) => 3 * r);
+  // A batch states a covariance of its last state only.
+  const stated = cell.bands[`${kind}_sigma_${axis}_${unit}`];
+  const deviation = stated ?? band;
+  const sigma3 = deviation.rms.map((r) => 3 * r);
+  const name3 = stated ? "estimator's 3 sigma, before alignment" : "3 sigma over trials";
   return chart({
     name: `${kind}_error_${axis}`, title: `${kind} error, ${axis}`,
-    rows: () => columnRows([["t_s", band.t_s], [`q05_${unit}`, band.q05], [`median_${unit}`, band.median], [`q95_${unit}`, band.q95], [`rms_${unit}`, band.rms]]),
+    rows: () => columnRows([["t_s", band.t_s], [`q05_${unit}`, band.q05], [`median_${unit}`, band.median], [`q95_${unit}`, band.q95], [`rms_${unit}`, band.rms],
+      ...(stated ? [["stated_t_s", stated.t_s], [`estimator_sigma_rms_${unit}`, stated.rms]] : [])]),
     option: (theme) => ({
       xAxis: timeAxis, yAxis: { type: "value", name: `error [${unit === "deg" ? "\u00b0" : unit}]` }, tooltip: { trigger: "axis" },
       series: [
         area("5 to 95 % of trials", band.t_s, band.q05, band.q95, theme.colours[0], 0.25),
         line("median", band.t_s, band.median, theme.colours[0]),
-        line("3 sigma over trials", band.t_s, sigma3, theme.colours[1], { type: "dashed" }),
-        { ...line("3 sigma over trials", band.t_s, negative(sigma3), theme.colours[1], { type: "dashed" }), tooltip: { show: false } },
+        line(name3, deviation.t_s, sigma3, theme.colours[1], { type: "dashed" }),
+        { ...line(name3, deviation.t_s, negative(sigma3), theme.colours[1], { type: "dashed" }), tooltip: { show: false } },
       ],
     }),
   });

@@ -6,9 +6,8 @@
 //     b_k(td) = b_k - (td - td_k + (row_k - rows/2)/rows readout) v_k,   dr_k/dtd = -(n_c.v_k)/m
 //     row_k the observed row, v_k the velocity of the end point on the normalised plane, td_k the td with which the
 //     state's time was formed. Of v only the part across the line counts.
-//   PropagatedLineFactor   the same blocks; camera timing `propagated`: the law of timed_line.h, the body carried by
-//   the
-//     IMU from the state (timed_body.h)
+//   PropagatedLineFactor   the same blocks; camera timing `propagated`: the law of timed_line.h, with the body
+//     carried by the IMU from the state (timed_body.h)
 //
 // With no readout this is CameraLineFactor at the pose at tau; at r = 0 and no motion all three agree.
 //
